@@ -1,0 +1,43 @@
+#!/bin/sh
+# Set the project up in ./.venv:  ./setup.sh        what it takes to run scenarios
+#                                 ./setup.sh test   and what it takes to test and develop
+# On Debian and its relatives the system packages are installed as well, where we may (root, or sudo without a
+# password); elsewhere what is missing is named.
+set -eu
+cd "$(dirname "$0")"
+
+# Python, and for the tests, which build an FMU in C and mesh the heart, a compiler and the shared libraries that gmsh's wheel leaves to the system.
+packages="python3 python3-venv"
+[ "${1:-}" = test ] && packages="$packages gcc libc6-dev libgl1 libglu1-mesa libgomp1 libxcursor1 libxft2 libxinerama1"
+
+missing=""
+if command -v dpkg-query >/dev/null; then
+    for package in $packages; do
+        dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
+    done
+fi
+# A Python that can make environments will do, wherever it came from.
+if command -v python3 >/dev/null && python3 -c 'import ensurepip, venv' 2>/dev/null; then
+    missing=$(echo "$missing" | sed 's/ python3-venv//; s/ python3//')
+fi
+if [ -n "$missing" ]; then
+    if [ "$(id -u)" = 0 ]; then
+        apt-get update -qq && apt-get install -y -qq --no-install-recommends $missing ca-certificates
+    elif sudo -n true 2>/dev/null; then
+        sudo apt-get update -qq && sudo apt-get install -y -qq --no-install-recommends $missing ca-certificates
+    else
+        echo "setup: please install first: apt-get install$missing" >&2
+        exit 1
+    fi
+fi
+
+python3 -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || {
+    echo "setup: Python 3.11, 3.12 or 3.13 is needed; python3 is $(python3 --version)" >&2
+    exit 1
+}
+[ -x .venv/bin/python ] || python3 -m venv .venv
+if [ "${1:-}" = test ]; then
+    .venv/bin/python -m pip install --quiet --editable '.[test]'
+else
+    .venv/bin/python -m pip install --quiet --editable .
+fi

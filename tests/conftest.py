@@ -1,0 +1,52 @@
+"""What many tests share: a heart small enough to beat in a second, and a scenario for it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.mesh.file import read_mesh
+
+DATA = Path(__file__).parent / "data"
+
+_SCENARIO = """\
+name: small
+scene: {mesh: MESH}
+units:
+  fibers: {unit: fiber_generator}
+  electrophysiology: {unit: electrophysiology, parameters: {stimulus_depth_mm: 5}}
+  active_stress: {unit: active_stress}
+  mechanics: {unit: mechanics}
+coupling: {scheme: gauss-seidel, step_ms: 1}
+run: {stop_ms: 10, participants: native}
+output:
+  every_ms: 5
+  probes_mm: {base: [25, 0, -1], apex: [0, 0, -60]}
+"""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _cache_of_our_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests neither fill the user's cache of FMUs nor take anything from it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="session")
+def small_heart_file() -> Path:
+    """The biventricle at 12 mm (271 nodes), made by `Biventricle().mesh(12)`; far too coarse for physics."""
+    return DATA / "biventricle_12mm.msh"
+
+
+@pytest.fixture(scope="session")
+def small_heart(small_heart_file: Path) -> Mesh:
+    return read_mesh(small_heart_file)
+
+
+@pytest.fixture
+def small_scenario(tmp_path: Path, small_heart_file: Path) -> Path:
+    """A scenario file of a short native run on the small heart, in a folder of its own."""
+    path = tmp_path / "small.yaml"
+    path.write_text(_SCENARIO.replace("MESH", str(small_heart_file)))
+    return path

@@ -1,0 +1,189 @@
+"""If these fail, the tissue resists deformation with the wrong force, or Newton's method goes the wrong way."""
+
+import numpy as np
+import pytest
+from cardiac_cosim.units.mechanics.holzapfel_fiber import HolzapfelFiber
+from cardiac_cosim.units.mechanics.kinematics import Kinematics, cofactors, determinant, voigt
+from cardiac_cosim.units.mechanics.neo_hooke import NeoHooke
+from scipy.spatial.transform import Rotation
+
+_FIBER = np.array([0.6, -0.48, 0.64])
+_FIBER /= np.linalg.norm(_FIBER)
+# So small because of the fibre, which stiffens so fast that its higher derivatives count.
+_STEPS = (4e-3, 2e-3, 1e-3)
+
+_LAWS = {
+    "neo_hooke": NeoHooke(),
+    "neo_hooke as the seed prints it": NeoHooke(neo_hooke_log_sign="seed"),
+    "fiber": HolzapfelFiber(),
+}
+
+
+def _at(gradient: np.ndarray, fiber: np.ndarray = _FIBER) -> Kinematics:
+    gradient = np.asarray(gradient, dtype=float).reshape(-1, 3, 3)
+    cauchy_green = gradient.transpose(0, 2, 1) @ gradient
+    structure = np.tile(np.outer(fiber, fiber), (len(gradient), 1, 1))
+    return Kinematics(cauchy_green, np.linalg.inv(cauchy_green), np.log(np.linalg.det(gradient)), structure)
+
+
+def _isochoric_fiber_square(gradient: np.ndarray) -> float:
+    return float(np.linalg.det(gradient) ** (-2.0 / 3.0) * np.sum((gradient @ _FIBER) ** 2))
+
+
+def _gradients(taut: bool) -> list[np.ndarray]:
+    """Random deformations with the fibre in tension, or slack."""
+    random, found = np.random.default_rng(7), []
+    while len(found) < 4:
+        gradient = np.eye(3) + random.uniform(-0.25, 0.25, (3, 3))
+        square = _isochoric_fiber_square(gradient)
+        if np.linalg.det(gradient) > 0.3 and (1.05 < square < 1.5 if taut else 0.5 < square < 0.95):
+            found.append(gradient)
+    return found
+
+
+_CASES = [
+    pytest.param(law, gradient, id=f"{name}-{'taut' if taut else 'slack'}-{number}")
+    for name, law in _LAWS.items()
+    for taut in (True, False)
+    for number, gradient in enumerate(_gradients(taut))
+    if taut or name != "fiber"
+]
+
+
+@pytest.mark.parametrize(("law", "gradient"), _CASES)
+def test_stress_is_the_derivative_of_the_energy(law, gradient: np.ndarray, slopes) -> None:
+    direction = np.random.default_rng(8).standard_normal((3, 3))
+    nominal = gradient @ law.stress(_at(gradient))[0]
+    exact = np.sum(nominal * direction)
+
+    def difference(step: float) -> float:
+        up, down = (law.energy(_at(gradient + sign * step * direction))[0] for sign in (1.0, -1.0))
+        return (up - down) / (2.0 * step)
+
+    errors = [abs(difference(step) - exact) for step in _STEPS]
+    assert errors[-1] < 1e-2 * np.linalg.norm(nominal)
+    orders = slopes(_STEPS, errors)
+    assert ((orders > 1.9) & (orders < 2.1)).all(), orders
+
+
+@pytest.mark.parametrize(("law", "gradient"), _CASES)
+def test_tangent_is_the_derivative_of_the_stress(law, gradient: np.ndarray, slopes) -> None:
+    direction = np.random.default_rng(9).standard_normal((3, 3))
+    strain = 0.5 * (direction.T @ gradient + gradient.T @ direction)
+    engineering = voigt(strain[None])[0] * [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+    exact = law.tangent(_at(gradient))[0] @ engineering
+
+    def difference(step: float) -> np.ndarray:
+        up, down = (voigt(law.stress(_at(gradient + sign * step * direction)))[0] for sign in (1.0, -1.0))
+        return (up - down) / (2.0 * step)
+
+    errors = [np.abs(difference(step) - exact).max() for step in _STEPS]
+    assert errors[-1] < 1e-2 * np.abs(exact).max()
+    orders = slopes(_STEPS, errors)
+    assert ((orders > 1.9) & (orders < 2.1)).all(), orders
+
+
+@pytest.mark.parametrize(("law", "gradient"), _CASES)
+def test_stress_and_tangent_have_their_symmetries(law, gradient: np.ndarray) -> None:
+    stress, tangent = law.stress(_at(gradient))[0], law.tangent(_at(gradient))[0]
+    np.testing.assert_allclose(stress, stress.T, rtol=0.0, atol=1e-14 * np.abs(stress).max())
+    np.testing.assert_allclose(tangent, tangent.T, rtol=0.0, atol=1e-13 * np.abs(tangent).max())
+
+
+@pytest.mark.parametrize(("law", "gradient"), _CASES)
+def test_rotating_the_deformed_tissue_changes_nothing(law, gradient: np.ndarray) -> None:
+    turned = Rotation.random(rng=10).as_matrix() @ gradient
+    assert np.abs(turned - gradient).max() > 0.5
+    np.testing.assert_allclose(law.energy(_at(turned)), law.energy(_at(gradient)), rtol=1e-12)
+    np.testing.assert_allclose(law.stress(_at(turned)), law.stress(_at(gradient)), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(law.tangent(_at(turned)), law.tangent(_at(gradient)), rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("gradient", _gradients(True))
+def test_turning_tissue_and_load_together_turns_the_stress(gradient: np.ndarray) -> None:
+    turn = Rotation.random(rng=11).as_matrix()
+    stress = HolzapfelFiber().stress(_at(gradient))[0]
+    turned = HolzapfelFiber().stress(_at(gradient @ turn.T, turn @ _FIBER))[0]
+    np.testing.assert_allclose(turned, turn @ stress @ turn.T, rtol=1e-9, atol=1e-14)
+
+
+def test_energies_are_zero_and_stress_free_at_rest() -> None:
+    rest = _at(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    for law in (NeoHooke(), HolzapfelFiber()):
+        assert law.energy(rest)[0] == 0.0
+        assert not law.stress(rest).any()
+
+
+def test_seeds_sign_carries_a_stress_of_two_shear_moduli_at_rest() -> None:
+    stress = NeoHooke(neo_hooke_log_sign="seed").stress(_at(np.eye(3)))[0]
+    np.testing.assert_allclose(stress, 2.0 * 0.2 * np.eye(3), rtol=1e-15)
+
+
+def test_neo_hooke_at_rest_is_hookes_law() -> None:
+    # λ_L 1⊗1 + 2μ I: Voigt 11,11 = λ + 2μ, 11,22 = λ, shears μ.
+    expected = np.zeros((6, 6))
+    expected[:3, :3] = 0.5
+    expected += np.diag([0.4, 0.4, 0.4, 0.2, 0.2, 0.2])
+    np.testing.assert_allclose(NeoHooke().tangent(_at(np.eye(3)))[0], expected, rtol=1e-14)
+
+
+def test_stresses_by_hand() -> None:
+    # F = diag(1.2, 1, 1), fibre along x: C⁻¹ = diag(1/1.44, 1, 1), ln J = ln 1.2, Ī_a = 1.2^(4/3).
+    at = _at(np.diag([1.2, 1.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    inverse, log = np.diag([1.0 / 1.44, 1.0, 1.0]), np.log(1.2)
+    np.testing.assert_allclose(
+        NeoHooke().stress(at)[0], 0.2 * (np.eye(3) - inverse) + 0.5 * log * inverse, rtol=1e-13, atol=1e-16
+    )
+    extension = 1.2 ** (4.0 / 3.0) - 1.0
+    push = 2.0 * 0.001685 * extension * np.exp(15.779 * extension**2) * 1.2 ** (-2.0 / 3.0)
+    np.testing.assert_allclose(
+        HolzapfelFiber().stress(at)[0], push * (np.diag([1.0, 0.0, 0.0]) - 1.44 / 3.0 * inverse), rtol=1e-13
+    )
+    assert HolzapfelFiber().energy(at)[0] == pytest.approx(0.001685 / 31.558 * np.expm1(15.779 * extension**2))
+
+
+@pytest.mark.parametrize("gradient", _gradients(False))
+def test_slack_fibre_carries_nothing(gradient: np.ndarray) -> None:
+    fiber, at = HolzapfelFiber(), _at(gradient)
+    assert fiber.energy(at)[0] == 0.0
+    assert not fiber.stress(at).any()
+    assert not fiber.tangent(at).any()
+
+
+def test_fibre_stress_is_continuous_where_it_goes_slack_and_its_tangent_jumps() -> None:
+    # Isochoric: F = diag(λ, 1/√λ, 1/√λ), Ī_a = λ².
+    fiber, along = HolzapfelFiber(), np.array([1.0, 0.0, 0.0])
+
+    def at(stretch: float) -> Kinematics:
+        return _at(np.diag([stretch, stretch**-0.5, stretch**-0.5]), along)
+
+    tensions = [fiber.stress(at(1.0 + step))[0, 0, 0] for step in (1e-3, 1e-4, 1e-5)]
+    # S_11 → 2k₁ (Ī_a − 1) ⅔ = (8/3) k₁ (λ − 1): goes to zero linearly.
+    np.testing.assert_allclose(tensions, 8.0 / 3.0 * 0.001685 * np.array([1e-3, 1e-4, 1e-5]), rtol=5e-3)
+    assert not fiber.stress(at(1.0 - 1e-5)).any()
+    # 4 W'' (∂Ī_a/∂C)² = 4k₁ (2/3)² along the fibre just above, nothing just below.
+    assert fiber.tangent(at(1.0 + 1e-7))[0, 0, 0] == pytest.approx(4.0 * 0.001685 * 4.0 / 9.0, rel=1e-5)
+    assert not fiber.tangent(at(1.0 - 1e-7)).any()
+
+
+@pytest.mark.parametrize("law", [NeoHooke(), HolzapfelFiber()])
+def test_elements_do_not_see_each_other(law) -> None:
+    gradients = np.array(_gradients(True) + _gradients(False))
+    together = law.stress(_at(gradients)), law.tangent(_at(gradients)), law.energy(_at(gradients))
+    for number, gradient in enumerate(gradients):
+        alone = law.stress(_at(gradient)), law.tangent(_at(gradient)), law.energy(_at(gradient))
+        for whole, part in zip(together, alone, strict=True):
+            np.testing.assert_allclose(whole[number], part[0], rtol=1e-13, atol=1e-16)
+
+
+def test_kinematics_are_lapacks() -> None:
+    gradients = np.array(_gradients(True) + _gradients(False))
+    ratio = determinant(gradients)
+    np.testing.assert_allclose(ratio, np.linalg.det(gradients), rtol=1e-13)
+    expected = ratio[:, None, None] * np.linalg.inv(gradients).transpose(0, 2, 1)
+    np.testing.assert_allclose(cofactors(gradients), expected, rtol=1e-12, atol=1e-14)
+    made, exact = Kinematics.of(gradients, ratio, np.tile(np.outer(_FIBER, _FIBER), (8, 1, 1))), _at(gradients)
+    np.testing.assert_allclose(made.cauchy_green, exact.cauchy_green, rtol=1e-14)
+    np.testing.assert_allclose(made.inverse, exact.inverse, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(made.log_volume, exact.log_volume, rtol=1e-12)
+    np.testing.assert_allclose(made.fiber_stretch_squared, np.sum((gradients @ _FIBER) ** 2, axis=1), rtol=1e-13)

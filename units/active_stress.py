@@ -1,0 +1,155 @@
+"""The active stress unit: the tension that a depolarised cell builds up with a delay, at every node by itself.
+
+    ∂s_a/∂t = ε(Φ)(k(Φ − Φ_r) − s_a),   ε = ε₀ + (ε₁ − ε₀) exp(−exp(−ζ(Φ − Φ_t)))
+
+Input: the transmembrane potential, held over a step or ramped; optionally the stretch. Output: s_a in kPa. Source:
+model.md, Active stress; Göktepe & Kuhl 2010, eq. 46. The step is exact for a held potential, of any length.
+
+Ramped, the potential jumps from its value in the last step to that of this one at a moment evenly distributed over the
+step: its mean is the line between the two, and the mean active stress is known in closed form, of second order. The
+line itself, followed by every node, would be as good for a slow potential and worse for a fast one: an upstroke takes
+one millisecond, of which the delay's threshold is reached somewhere in the step, and not always near its end.
+
+With `length_dependence` η the output is s_a (1 + η(λ − 1)), λ averaged from the elements around a node by volume
+(Frank–Starling). Active stress and mechanics then form an algebraic loop.
+
+How it fails: the delay function as the seed prints it, ε₀ + (ε₀ − ε₁) exp(…), is negative in depolarised tissue, and
+the active stress runs away from its target instead of to it. A relaxation rate that is not positive ends the step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.special import exprel
+
+from .arrays import FloatArray
+from .errors import StepFailure
+from .input_ramp import InputRamp
+from .snapshot import State
+from .unit import Unit
+from .variable import Causality, Location, Record, Variable, parameter
+
+_KPA_PER_MPA = 1000.0
+
+
+@dataclass(frozen=True)
+class Tension:
+    """Target and delay of the active stress (Göktepe & Kuhl 2010)."""
+
+    tension_per_potential_MPa_per_mV: float = parameter(0.005, "MPa/mV", "k, active stress per potential", at_least=0.0)
+    tension_rest_potential_mV: float = parameter(-80.0, "mV", "Phi_r, potential without active stress")
+    tension_threshold_potential_mV: float = parameter(0.0, "mV", "Phi_t, potential at which the delay changes")
+    slow_rate_per_ms: float = parameter(0.1, "1/ms", "epsilon_0, rate of the delay at rest", above=0.0)
+    fast_rate_per_ms: float = parameter(1.0, "1/ms", "epsilon_1, rate of the delay when depolarised", above=0.0)
+    delay_slope_per_mV: float = parameter(1.0, "1/mV", "zeta, steepness of the delay function", above=0.0)
+    delay_function: str = parameter(
+        "gompertz",
+        "1",
+        "gompertz: eps_0 + (eps_1 - eps_0) exp(-exp(..)); seed: eps_0 + (eps_0 - eps_1) exp(-exp(..)), unstable",
+        choices=("gompertz", "seed"),
+    )
+    length_dependence: float = parameter(0.0, "1", "eta, relative active stress per stretch (Frank-Starling)")
+
+    def rate(self, potential: FloatArray) -> FloatArray:
+        """ε in 1/ms at the potentials (mV)."""
+        exponent = -self.delay_slope_per_mV * (potential - self.tension_threshold_potential_mV)
+        # exp(-exp(x)) is 0 to the last bit from x = 7 on; capping x keeps exp from overflowing far below threshold.
+        switch = np.exp(-np.exp(np.minimum(exponent, 50.0)))
+        jump = self.fast_rate_per_ms - self.slow_rate_per_ms
+        return np.asarray(self.slow_rate_per_ms + (-jump if self.delay_function == "seed" else jump) * switch)
+
+    def target(self, potential: FloatArray) -> FloatArray:
+        """k(Φ − Φ_r) in MPa."""
+        return self.tension_per_potential_MPa_per_mV * (potential - self.tension_rest_potential_mV)
+
+
+class ActiveStress(Unit):
+    """Active stress by a potential-dependent first-order delay."""
+
+    name = "active_stress"
+    groups = (Tension, InputRamp)
+    fields = (
+        Variable("potential", Causality.INPUT, "mV", "transmembrane potential", Location.NODE, start=-80.0),
+        Variable(
+            "stretch",
+            Causality.INPUT,
+            "1",
+            "stretch along the fibre",
+            Location.ELEMENT,
+            start=1.0,
+            above=0.0,
+            needs="length_dependence",
+        ),
+        Variable(
+            "active_stress",
+            Causality.OUTPUT,
+            "kPa",
+            "active stress along the fibre",
+            Location.NODE,
+            depends_on=("potential", "stretch"),
+            pointwise=True,
+            record=Record.MEAN,
+        ),
+    )
+
+    def prepare(self) -> None:
+        """Set up the average of the stretch around a node, where it is needed."""
+        self._tension = self.parameters(Tension)
+        if self._tension.length_dependence:
+            nodes = self.mesh.cells.ravel()
+            elements = np.repeat(np.arange(self.mesh.elements), self.mesh.cells.shape[1])
+            weights = coo_matrix((self.mesh.volumes[elements], (nodes, elements))).tocsr()
+            self._average = weights.multiply(1.0 / weights.sum(axis=1)).tocsr()
+
+    def initial(self, inputs: State) -> dict[str, FloatArray]:
+        """No active stress, whatever the potential."""
+        return {"tension": np.zeros(self.mesh.nodes), "active_stress": np.zeros(self.mesh.nodes)}
+
+    def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
+        """The exact solution for a held potential, or its mean over the moments at which the potential may change.
+
+        StepFailure where the delay's rate is not positive.
+        """
+        first, last, tension = begin["potential"], inputs["potential"], state["tension"]
+        decay = self._rate(last) * step
+        target = self._tension.target(last)
+        if np.array_equal(first, last):
+            tension = tension - (target - tension) * np.expm1(-decay)
+        else:
+            earlier_decay, earlier_target = self._rate(first) * step, self._tension.target(first)
+            slower = np.minimum(decay, earlier_decay)
+            tension = (
+                target
+                + (earlier_target - target) * exprel(-decay)
+                + (tension - earlier_target) * np.exp(-slower) * exprel(-abs(decay - earlier_decay))
+            )
+        return {"tension": tension, "active_stress": _KPA_PER_MPA * tension * self._length_factor(inputs["stretch"])}
+
+    def output(self, name: str, state: State) -> FloatArray:
+        """Active stress in kPa, shape (nodes,)."""
+        return state[name]
+
+    def _rate(self, potential: FloatArray) -> FloatArray:
+        rate = self._tension.rate(potential)
+        if rate.min() <= 0.0:
+            node = int(rate.argmin())
+            raise StepFailure(
+                f"the delay function gives the rate {rate[node]:.3g}/ms at node {node} (potential "
+                f"{potential[node]:.1f} mV): the active stress would grow without bound, away from its target"
+                + (
+                    ". That is the delay as the seed prints it; use delay_function: gompertz"
+                    if self._tension.delay_function == "seed"
+                    else ""
+                )
+            )
+        return rate
+
+    def _length_factor(self, stretch: FloatArray) -> FloatArray | float:
+        eta = self._tension.length_dependence
+        if not eta:
+            return 1.0
+        factor = 1.0 + eta * (self._average @ stretch - 1.0)
+        if factor.min() < 0.0:
+            raise StepFailure(f"length_dependence {eta:g} turns it negative at node {factor.argmin()}")
+        return np.asarray(factor)

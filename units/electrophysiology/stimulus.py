@@ -1,0 +1,39 @@
+"""The initial stimulus: a potential set on the nodes in a box at the base (model.md, Electrophysiology)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..errors import InvalidInput
+from ..variable import parameter
+
+#: Depth in mm that stands for the seed's surface stimulus (Z > −1e-4 mm) when the depth is given as 0.
+_SURFACE = 1e-4
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """Nodes with x_min < X < x_max, |Y| < half width and Z > −depth start at the stimulus potential."""
+
+    stimulus_potential_mV: float = parameter(-10.0, "mV", "potential of the stimulated nodes at the start")
+    stimulus_x_min_mm: float = parameter(0.0, "mm", "lower X limit of the stimulus box")
+    stimulus_x_max_mm: float = parameter(31.0, "mm", "upper X limit of the stimulus box")
+    stimulus_half_width_mm: float = parameter(10.0, "mm", "limit of |Y| of the stimulus box", above=0.0)
+    stimulus_depth_mm: float = parameter(
+        2.0, "mm", "depth of the stimulus box below the base; 0: the base's nodes only", at_least=0.0
+    )
+
+    def nodes(self, points: FloatArray) -> np.ndarray:
+        """Mask of the stimulated ones among `points` (mm), shape (points,); InvalidInput if there is none."""
+        x, y, z = points.T
+        inside = (x > self.stimulus_x_min_mm) & (x < self.stimulus_x_max_mm)
+        inside &= np.abs(y) < self.stimulus_half_width_mm
+        inside &= z > -max(self.stimulus_depth_mm, _SURFACE)
+        if not inside.any():
+            raise InvalidInput(
+                f"no node of the mesh lies in the stimulus box {self.stimulus_x_min_mm:g} < X < "
+                f"{self.stimulus_x_max_mm:g}, |Y| < {self.stimulus_half_width_mm:g}, "
+                f"Z > {-self.stimulus_depth_mm:g} mm; enlarge the box (stimulus_depth_mm) or refine the mesh"
+            )
+        return np.asarray(inside)

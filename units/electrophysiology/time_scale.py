@@ -1,0 +1,48 @@
+"""The time scale β_t of the ionic model, by the expected time of activation (model.md, Electrophysiology)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..errors import InvalidInput
+from ..variable import parameter
+
+
+@dataclass(frozen=True)
+class TimeScale:
+    """β_t = β (1 − τ₀ (t_a − t₀)/(t₁ − t₀)): what activates later repolarises faster.
+
+    The expected activation time t_a is linear in Z. `last_first` grows from the base to the apex, so that the last to
+    depolarise is the first to repolarise, as observed. `seed` is the printed t_a = t_apex (1 − Z/Z_apex), by which
+    the base repolarises first: it runs and contradicts the text around it.
+    """
+
+    time_scale_ms: float = parameter(12.9, "ms", "beta, time scale at t_a = t_0", above=0.0)
+    time_scale_reduction: float = parameter(0.55, "1", "tau_0, relative reduction of beta at t_a = t_1")
+    time_scale_start_ms: float = parameter(12.0, "ms", "t_0, start of the reduction")
+    time_scale_end_ms: float = parameter(75.0, "ms", "t_1, end of the reduction")
+    apex_activation_time_ms: float = parameter(50.0, "ms", "expected activation time across the height", at_least=0.0)
+    apex_z_mm: float = parameter(-70.0, "mm", "Z of the left ventricle's apex", below=0.0)
+    activation_time_map: str = parameter(
+        "last_first",
+        "1",
+        "expected activation time along Z: last_first grows towards the apex, seed towards the base",
+        choices=("last_first", "seed"),
+    )
+
+    def __call__(self, z: FloatArray) -> FloatArray:
+        """β_t in ms at the heights `z` in mm; InvalidInput where it is not positive."""
+        height = z / self.apex_z_mm
+        expected = self.apex_activation_time_ms * (1.0 - height if self.activation_time_map == "seed" else height)
+        span = self.time_scale_end_ms - self.time_scale_start_ms
+        if span == 0.0:
+            raise InvalidInput("time_scale_start_ms equals time_scale_end_ms; they have to differ")
+        scale = self.time_scale_ms * (1.0 - self.time_scale_reduction * (expected - self.time_scale_start_ms) / span)
+        shortest = int(np.argmin(scale))
+        if scale[shortest] <= 0.0:
+            raise InvalidInput(
+                f"the ionic time scale falls to {scale[shortest]:.3g} ms at Z = {z[shortest]:.1f} mm; it has to "
+                "stay positive: lower time_scale_reduction or check apex_z_mm"
+            )
+        return np.asarray(scale)

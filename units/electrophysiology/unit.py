@@ -1,0 +1,178 @@
+"""The electrophysiology unit: the monodomain equation with Aliev–Panfilov kinetics in the material frame.
+
+    ∂Φ/∂t = ∇·(D∇Φ) − (β_φ/β_t)(Ĩ_e + Ĩ_m),   zero flux,   Ĩ_m = G_s max(λ − 1, 0)(φ − φ_s)
+
+Inputs: the stretch λ of the elements, held over a step or ramped (then each substep sees it as it is in its middle),
+and once the fibre directions. Outputs: the transmembrane potential and the activation time at the nodes. Source:
+model.md, Electrophysiology.
+
+With `refine` the unit solves on a nested refinement of the scene's mesh: fibre and stretch are those of the element
+that a part lies in, potential and activation time are given at the scene's nodes.
+
+Linear elements; an implicit-explicit Runge–Kutta method of second order over substeps of equal length (`monodomain`).
+
+How it fails: an element coarser than the wave front (≈ 8 mm) gives wrong speeds; a potential that is not finite any
+more, or a linear system that is not solved, ends the step with StepFailure.
+"""
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..directions import FIBER_INPUT, check_directions
+from ..errors import InvalidInput, StepFailure
+from ..input_ramp import InputRamp
+from ..mesh.refinement import refined
+from ..snapshot import State
+from ..unit import Unit
+from ..variable import Causality, Location, Record, Variable, parameter
+from .aliev_panfilov import AlievPanfilov
+from .monodomain import Conduction, Monodomain
+from .stimulus import Stimulus
+from .time_scale import TimeScale
+
+#: Activation time of a node that no wave has reached yet.
+NOT_ACTIVATED = -1.0
+
+
+@dataclass(frozen=True)
+class PotentialScale:
+    """Φ = β_φ φ + δ_φ, and the potential that counts as activated."""
+
+    rest_potential_mV: float = parameter(-80.0, "mV", "delta_phi, potential at rest")
+    potential_range_mV: float = parameter(100.0, "mV", "beta_phi, potential range of the action potential", above=0.0)
+    activation_potential_mV: float = parameter(-20.0, "mV", "potential whose upward crossing is the activation")
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How finely the unit solves inside, in time and in space."""
+
+    longest_substep_ms: float = parameter(0.25, "ms", "longest substep inside a communication step", above=0.0)
+    refine: int = parameter(0, "1", "nested refinements of the mesh to solve on; each halves the elements", at_least=0)
+
+
+class Electrophysiology(Unit):
+    """Monodomain with stretch-activated current on linear elements."""
+
+    name = "electrophysiology"
+    groups = (PotentialScale, Resolution, AlievPanfilov, Conduction, TimeScale, Stimulus, InputRamp)
+    fields = (
+        Variable(
+            "stretch",
+            Causality.INPUT,
+            "1",
+            "stretch along the fibre",
+            Location.ELEMENT,
+            start=1.0,
+            above=0.0,
+            needs="stretch_conductance",
+        ),
+        FIBER_INPUT,
+        Variable(
+            "potential",
+            Causality.OUTPUT,
+            "mV",
+            "transmembrane potential",
+            Location.NODE,
+            depends_on=("stretch", "fiber"),
+            record=Record.PROBES,
+        ),
+        Variable(
+            "activation_time",
+            Causality.OUTPUT,
+            "ms",
+            "time of the first upward crossing of the activation potential; -1 before it",
+            Location.NODE,
+            depends_on=("stretch", "fiber"),
+        ),
+    )
+
+    def prepare(self) -> None:
+        """Assemble mass and diffusion; InvalidInput if fibres, time scale or substep make no sense."""
+        fiber = self._inputs["fiber"]
+        check_directions("fiber", fiber)
+        self._scale = self.parameters(PotentialScale)
+        self._ionic = self.parameters(AlievPanfilov)
+        self._resolution = self.parameters(Resolution)
+        time_scale = self.parameters(TimeScale)
+        longest = self._ionic.longest_step * float(time_scale(self.mesh.points[:, 2]).min())
+        if self._resolution.longest_substep_ms > longest:
+            raise InvalidInput(
+                f"parameter 'longest_substep_ms' is {self._resolution.longest_substep_ms:g}; above {longest:.3g} ms "
+                "the explicit step of the ionic model does not resolve the upstroke"
+            )
+        self._inner = refined(self.mesh, self._resolution.refine)
+        inherited = fiber[self._inner.parents]
+        self._monodomain = Monodomain(self._inner.mesh, inherited, time_scale, self.parameters(Conduction))
+
+    def initial(self, inputs: State) -> dict[str, FloatArray]:
+        """Rest, except for the stimulated nodes."""
+        stimulus = self.parameters(Stimulus)
+        points = self._inner.mesh.points
+        potential = np.full(len(points), self._scale.rest_potential_mV)
+        potential[stimulus.nodes(points)] = stimulus.stimulus_potential_mV
+        if stimulus.stimulus_potential_mV <= self._lowest_potential:
+            raise InvalidInput(
+                f"parameter 'stimulus_potential_mV' is {stimulus.stimulus_potential_mV:g}; the ionic model holds above "
+                f"{self._lowest_potential:g} mV only"
+            )
+        already = potential >= self._scale.activation_potential_mV
+        return {
+            "phi": (potential - self._scale.rest_potential_mV) / self._scale.potential_range_mV,
+            "recovery": np.zeros(len(points)),
+            "activation_time": np.where(already, 0.0, NOT_ACTIVATED),
+        }
+
+    def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
+        """Equal substeps, in each of which the stretch is held."""
+        if step == 0.0:
+            return dict(state)
+        substeps = max(1, ceil(step / self._resolution.longest_substep_ms - 1e-9))
+        substep = step / substeps
+        first, last = (values["stretch"][self._inner.parents] for values in (begin, inputs))
+        held = np.array_equal(first, last)
+        stepper = self._monodomain.stepper(last, substep, self._ionic.rates)
+        phi, recovery, activation_time = state["phi"], state["recovery"], state["activation_time"]
+        for number in range(substeps):
+            before = phi
+            if not held:
+                middle = first + (number + 0.5) / substeps * (last - first)
+                stepper = self._monodomain.stepper(middle, substep, self._ionic.rates)
+            phi, recovery = stepper(phi, recovery)
+            if phi.min() <= -self._ionic.recovery_mu2:
+                raise StepFailure(
+                    f"the potential at node {phi.argmin()} fell below {self._lowest_potential:g} mV, the pole of the "
+                    "ionic model's recovery rate; look for degenerate elements there or lower longest_substep_ms"
+                )
+            activation_time = self._activated(activation_time, before, phi, time + number * substep, substep)
+        return {"phi": phi, "recovery": recovery, "activation_time": activation_time}
+
+    def output(self, name: str, state: State) -> FloatArray:
+        """Potential in mV or activation time in ms, shape (nodes,)."""
+        # The first nodes of a refined mesh are those of the scene's.
+        if name == "activation_time":
+            return state["activation_time"][: self.mesh.nodes]
+        phi = state["phi"][: self.mesh.nodes]
+        potential = self._scale.rest_potential_mV + self._scale.potential_range_mV * phi
+        potential.setflags(write=False)
+        return potential
+
+    @property
+    def _lowest_potential(self) -> float:
+        return self._scale.rest_potential_mV - self._ionic.recovery_mu2 * self._scale.potential_range_mV
+
+    def _activated(
+        self, earlier: FloatArray, before: FloatArray, after: FloatArray, time: float, substep: float
+    ) -> FloatArray:
+        threshold = (
+            self._scale.activation_potential_mV - self._scale.rest_potential_mV
+        ) / self._scale.potential_range_mV
+        crossed = (earlier == NOT_ACTIVATED) & (before < threshold) & (after >= threshold)
+        if not crossed.any():
+            return earlier
+        times = np.array(earlier)
+        times[crossed] = time + substep * (threshold - before[crossed]) / (after[crossed] - before[crossed])
+        return times

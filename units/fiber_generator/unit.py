@@ -1,0 +1,126 @@
+"""The fibre generator unit: static fibre and sheet directions from the anatomy (model.md, Fibre generator).
+
+The sheet direction s₀ points through the wall, from endocardium to epicardium. The fibre lies in the plane normal to
+it, at the angle θ from the horizontal, which runs linearly through the wall between its two ends and to zero at the
+apex. Both are computed once, at initialisation, and are constant per element; the relative distance β from the
+epicardium is taken at the nodes, where it is 0 and 1 on the two surfaces, and averaged to the elements.
+
+In scenes of points, lines and triangles there is no wall, and fibres run along x.
+
+How it fails: a mesh without the named boundaries, or with elements through whose wall no direction can be found, is
+refused with InvalidInput.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..mesh import Mesh
+from ..snapshot import State
+from ..unit import Unit
+from ..variable import Causality, Location, Variable, parameter
+from .transmural import transmural_direction, wall_distance
+
+#: The inner and outer surfaces of walls, as far as a mesh has them; `endocardium` is that of a piece of wall.
+ENDOCARDIUM = ("lv_endocardium", "rv_endocardium", "endocardium")
+EPICARDIUM = ("epicardium", "rv_septum")
+
+#: Sum of the two wall distances in mm that is zero but for rounding.
+_TOUCHING_MM = 1e-9
+
+#: 1 − |cosine| of the angle to the Z axis up to which a direction is vertical but for rounding.
+_VERTICAL = 1e-12
+
+
+@dataclass(frozen=True)
+class HelixRule:
+    """θ = (β θ_end + (1 − β) θ_epi)(1 − Z/Z_apex), β = D_epi/(D_epi + D_end)."""
+
+    endocardial_angle_deg: float = parameter(60.0, "deg", "theta_end, fibre angle at the endocardium")
+    epicardial_angle_deg: float = parameter(-60.0, "deg", "theta_epi, fibre angle at the epicardium")
+    apex_z_mm: float = parameter(-70.0, "mm", "Z of the left ventricle's apex, where the angle is zero", below=0.0)
+
+    def angle(self, inward: FloatArray, z: FloatArray) -> FloatArray:
+        """θ in rad from the relative distance β and the height in mm."""
+        degrees = inward * self.endocardial_angle_deg + (1.0 - inward) * self.epicardial_angle_deg
+        return np.asarray(np.deg2rad(degrees) * (1.0 - z / self.apex_z_mm))
+
+
+def relative_distance(to_epicardium: FloatArray, to_endocardium: FloatArray) -> FloatArray:
+    """β, 0 on the epicardium and 1 on the endocardium; 0.5 where both distances vanish."""
+    across = to_epicardium + to_endocardium
+    return np.divide(to_epicardium, across, out=np.full_like(across, 0.5), where=across > _TOUCHING_MM)
+
+
+def rotated_fiber(sheet: FloatArray, angle: FloatArray) -> FloatArray:
+    """a₀ = cos θ e₃ − sin θ e₂, e₂ the Z axis made normal to s₀, e₃ = s₀ × e₂; shape (elements, 3).
+
+    Where s₀ is vertical, in single elements at the very apex, the Z axis gives no direction in the wall. Any is as good
+    there, and the X axis takes its place.
+    """
+    vertical = np.abs(sheet[:, 2]) > 1.0 - _VERTICAL
+    reference = np.where(vertical[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    upward = reference - np.einsum("ei,ei->e", reference, sheet)[:, None] * sheet
+    upward /= np.linalg.norm(upward, axis=1, keepdims=True)
+    around = np.cross(sheet, upward)
+    return np.asarray(np.cos(angle)[:, None] * around - np.sin(angle)[:, None] * upward)
+
+
+def _along_x(elements: int) -> dict[str, FloatArray]:
+    """Fibres along x and sheets along y, for scenes without a wall."""
+    return {name: np.tile(axis, (elements, 1)) for name, axis in (("fiber", np.eye(3)[0]), ("sheet", np.eye(3)[1]))}
+
+
+def _present(mesh: Mesh, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of the boundaries that the mesh has; all, for the error that follows, where it has none."""
+    return tuple(name for name in names if name in mesh.boundaries) or names
+
+
+class FiberGenerator(Unit):
+    """Rule-based fibres; it has no inputs and a step changes nothing."""
+
+    name = "fiber_generator"
+    groups = (HelixRule,)
+    fields = (
+        Variable(
+            "fiber",
+            Causality.OUTPUT,
+            "1",
+            "fibre direction a0, a unit vector",
+            Location.ELEMENT,
+            components=3,
+            fixed=True,
+        ),
+        Variable(
+            "sheet",
+            Causality.OUTPUT,
+            "1",
+            "sheet direction s0 from endocardium to epicardium, a unit vector",
+            Location.ELEMENT,
+            components=3,
+            fixed=True,
+        ),
+    )
+
+    def prepare(self) -> None:
+        """Nothing outlives the initial state."""
+
+    def initial(self, inputs: State) -> dict[str, FloatArray]:
+        """Fibre and sheet directions."""
+        mesh = self.mesh
+        if mesh.dimension < 3:
+            return _along_x(mesh.elements)
+        inner, outer = _present(mesh, ENDOCARDIUM), _present(mesh, EPICARDIUM)
+        sheet = transmural_direction(mesh, inner, outer)
+        inward = relative_distance(wall_distance(mesh.points, mesh, outer), wall_distance(mesh.points, mesh, inner))
+        angle = self.parameters(HelixRule).angle(inward[mesh.cells].mean(axis=1), mesh.centroids[:, 2])
+        return {"fiber": rotated_fiber(sheet, angle), "sheet": sheet}
+
+    def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
+        """The directions do not change."""
+        return dict(state)
+
+    def output(self, name: str, state: State) -> FloatArray:
+        """Fibre or sheet directions, shape (elements, 3)."""
+        return state[name]

@@ -1,0 +1,1 @@
+"""Anatomies: each a recipe from a mesh size to a mesh with named boundaries."""

@@ -1,0 +1,289 @@
+"""The FMI-2 style step interface that every physics unit stands behind."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import FloatArray, frozen
+from .errors import CallOrderError, InvalidInput, StepFailure
+from .input_ramp import INPUT_INTERPOLATION
+from .mesh import Mesh
+from .snapshot import Snapshot, State
+from .variable import Causality, Location, Scalar, Variable, parameters_of
+
+Group = TypeVar("Group")
+_MS_PER_S = 1000.0
+
+
+class Phase(Enum):
+    """Where a unit stands in its life (FMI 2.0.4, section 4.2.4)."""
+
+    INSTANTIATED = "instantiated"
+    INITIALIZATION = "in initialization mode"
+    STEPPING = "initialized"
+    TERMINATED = "terminated"
+
+
+class Unit(ABC):
+    """Base of the physics units: variables, phases, checks and rollback; a subclass adds the physics.
+
+    A subclass declares `name`, `groups` (frozen dataclasses of parameters), `fields` (inputs and outputs) and three
+    methods that never change an array in place: `prepare`, `initial` and `advance`. What `advance` returns replaces
+    the state only when it is complete and finite, so a step that fails leaves the unit as it was.
+
+    Times are seconds at this interface, as in FMI; inside, the physics is in ms.
+    """
+
+    name: ClassVar[str]
+    groups: ClassVar[tuple[type, ...]]
+    fields: ClassVar[tuple[Variable, ...]]
+    #: Whether its outputs follow its inputs at the same time, whatever was before: a quasi-static equilibrium.
+    memoryless: ClassVar[bool] = False
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self.phase = Phase.INSTANTIATED
+        self._parameters: dict[str, Scalar] = {}
+        self._inputs: dict[str, FloatArray] = {}
+        # The inputs at the end of the last step, where they are ramped; else empty.
+        self._begins: dict[str, FloatArray] = {}
+        self._state: dict[str, FloatArray] = {}
+
+    # --- declaration -------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def variables(cls) -> tuple[Variable, ...]:
+        """Every variable of the unit: parameters first, then inputs and outputs."""
+        return (*(variable for group in cls.groups for variable in parameters_of(group)), *cls.fields)
+
+    @classmethod
+    def variable(cls, name: str) -> Variable:
+        """The variable `name`; InvalidInput if the unit has none."""
+        for variable in cls.variables():
+            if variable.name == name:
+                return variable
+        raise InvalidInput(f"unit '{cls.name}' has no variable '{name}'")
+
+    # --- life cycle, in FMI order -------------------------------------------------------------------------------------
+
+    def instantiate(self, parameters: Mapping[str, Any]) -> None:
+        """Take parameters over the declared defaults; InvalidInput for an unknown name or a value out of range."""
+        self._require(Phase.INSTANTIATED)
+        # Checked all before any is taken: a refused call changes nothing.
+        checked = {name: self._parameter(name).checked(value) for name, value in parameters.items()}
+        self._parameters |= checked
+
+    def setup_experiment(self, start_time: float = 0.0, stop_time: float | None = None) -> None:
+        """Accept the experiment's times in s; the units' physics starts at 0."""
+        self._require(Phase.INSTANTIATED)
+        if start_time != 0.0:
+            raise InvalidInput(f"unit '{self.name}' starts at t = 0 s, not at {start_time} s")
+
+    def enter_initialization_mode(self) -> None:
+        """From here inputs get their initial values."""
+        self._require(Phase.INSTANTIATED)
+        for variable in self.fields:
+            if variable.causality is Causality.INPUT and variable.name not in self._inputs:
+                self._inputs[variable.name] = self._default(variable)
+        self.phase = Phase.INITIALIZATION
+
+    def exit_initialization_mode(self) -> None:
+        """Build the operators from parameters and inputs and compute the initial state.
+
+        Raises
+        ------
+        InvalidInput
+            If parameters, inputs and mesh do not fit together.
+        StepFailure
+            If the physics has no initial state.
+        """
+        self._require(Phase.INITIALIZATION)
+        self.prepare()
+        self._state = self._sound(self.initial(self._inputs))
+        self._begins = dict(self._inputs) if self._ramps else {}
+        self.phase = Phase.STEPPING
+
+    def do_step(self, time: float, step: float) -> None:
+        """Advance from `time` by `step` (both in s, step ≥ 0) with the inputs last set, held or ramped (`input_ramp`).
+
+        A step of 0 lets a memoryless unit follow its inputs and leaves the others as they are; a ramp of the next step
+        begins at the inputs of this one.
+
+        Raises
+        ------
+        StepFailure
+            If the physics cannot be advanced; the state is then as before the call.
+        """
+        self._require(Phase.STEPPING)
+        if not (np.isfinite(time) and np.isfinite(step) and step >= 0.0):
+            raise InvalidInput(f"unit '{self.name}' cannot step from {time} s by {step} s: both finite, the step >= 0")
+        begin = self._begins or self._inputs
+        self._state = self._sound(self.advance(self._state, begin, self._inputs, time * _MS_PER_S, step * _MS_PER_S))
+        self._begins = dict(self._inputs) if self._ramps else {}
+
+    def terminate(self) -> None:
+        """End the life of the instance; only `get` and `reset` remain."""
+        self._require(Phase.STEPPING)
+        self.phase = Phase.TERMINATED
+
+    def reset(self) -> None:
+        """Return to the moment after construction: default parameters, no inputs, no state."""
+        self.phase = Phase.INSTANTIATED
+        self._parameters = {}
+        self._inputs = {}
+        self._begins = {}
+        self._state = {}
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    def set(self, name: str, value: ArrayLike | str) -> None:
+        """Set a parameter (before initialisation) or an input (shape as declared, finite)."""
+        variable = self.variable(name)
+        if variable.causality is Causality.PARAMETER:
+            self._require(Phase.INSTANTIATED)
+            self._parameters[name] = variable.checked(value)
+        elif variable.causality is Causality.INPUT:
+            self._require(Phase.INSTANTIATED, Phase.INITIALIZATION, Phase.STEPPING)
+            if variable.fixed and self.phase is Phase.STEPPING:
+                raise CallOrderError(f"input '{name}' of unit '{self.name}' is fixed after initialisation")
+            self._inputs[name] = self._field(variable, value)
+        else:
+            raise InvalidInput(f"'{name}' is an output of unit '{self.name}' and cannot be set")
+
+    def get(self, name: str) -> Any:
+        """A variable's value: read-only array of the declared shape, or the parameter's scalar."""
+        variable = self.variable(name)
+        if variable.causality is Causality.PARAMETER:
+            return self._parameters.get(name, variable.start)
+        if variable.causality is Causality.INPUT:
+            return self._inputs[name] if name in self._inputs else self._default(variable)
+        self._require(Phase.STEPPING, Phase.TERMINATED)
+        return self.output(name, self._state)
+
+    def parameters(self, group: type[Group]) -> Group:
+        """The unit's values of one parameter group, as that frozen dataclass."""
+        return group(**{variable.name: self.get(variable.name) for variable in parameters_of(group)})
+
+    # --- rollback -----------------------------------------------------------------------------------------------------
+
+    def get_state(self) -> Snapshot:
+        """All that `set_state` needs to return here exactly. Costs references only: no array is copied."""
+        self._require(Phase.STEPPING)
+        return Snapshot(
+            self.name, self.mesh.fingerprint, dict(self._inputs), dict(self._state), begins=dict(self._begins)
+        )
+
+    def set_state(self, snapshot: Snapshot) -> None:
+        """Go back (or forth) to `snapshot`: the next step gives the same bits as it gave from there.
+
+        Raises
+        ------
+        InvalidInput
+            If the snapshot is of another unit, of another mesh, or made with other fixed inputs (fibres), from which
+            the unit's operators are built.
+        """
+        self._require(Phase.STEPPING)
+        if snapshot.unit != self.name:
+            raise InvalidInput(f"a state of unit '{snapshot.unit}' was given to unit '{self.name}'")
+        if snapshot.mesh != self.mesh.fingerprint:
+            raise InvalidInput(f"the state given to unit '{self.name}' belongs to another mesh")
+        for kind, arrays, own in (
+            ("input", snapshot.inputs, self._inputs),
+            ("state", snapshot.state, self._state),
+            ("input ramp's", snapshot.begins, self._begins),
+        ):
+            if {name: value.shape for name, value in arrays.items()} != {name: own[name].shape for name in own}:
+                raise InvalidInput(f"the {kind} arrays of the state do not fit unit '{self.name}'")
+        for variable in self.fields:
+            name = variable.name
+            fixed = variable.fixed and name in self._inputs
+            if fixed and not np.array_equal(snapshot.inputs[name], self._inputs[name]):
+                raise InvalidInput(
+                    f"the state given to unit '{self.name}' was made with another {name}; "
+                    "initialise the unit with the same one"
+                )
+        self._inputs = dict(snapshot.inputs)
+        self._begins = dict(snapshot.begins)
+        self._state = dict(snapshot.state)
+
+    serialize = staticmethod(Snapshot.to_bytes)
+    deserialize = staticmethod(Snapshot.from_bytes)
+
+    # --- the physics, in the subclass ---------------------------------------------------------------------------------
+
+    @abstractmethod
+    def prepare(self) -> None:
+        """Build what stays the same over the run from parameters, mesh and fixed inputs."""
+
+    @abstractmethod
+    def initial(self, inputs: State) -> dict[str, FloatArray]:
+        """The state at t = 0."""
+
+    @abstractmethod
+    def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
+        """The state one `step` (ms) after `time` (ms); inputs run linearly from `begin`, or are held, both the same."""
+
+    @abstractmethod
+    def output(self, name: str, state: State) -> FloatArray:
+        """The output `name` in `state`, read-only, of the declared shape."""
+
+    @property
+    def _ramps(self) -> bool:
+        declared = any(variable.name == INPUT_INTERPOLATION for variable in self.variables())
+        return declared and self.get(INPUT_INTERPOLATION) == "linear"
+
+    # --- checks -------------------------------------------------------------------------------------------------------
+
+    def _require(self, *phases: Phase) -> None:
+        if self.phase not in phases:
+            allowed = " or ".join(phase.value for phase in phases)
+            raise CallOrderError(
+                f"unit '{self.name}' is {self.phase.value}; this call needs it to be {allowed}. "
+                "Order: instantiate, setup_experiment, enter and exit initialization mode, do_step, terminate"
+            )
+
+    def _default(self, variable: Variable) -> FloatArray:
+        return frozen(np.full(variable.shape(self.mesh), variable.start))
+
+    def _field(self, variable: Variable, value: ArrayLike | str) -> FloatArray:
+        try:
+            array = frozen(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"input '{variable.name}' of unit '{self.name}' takes real numbers, not this: {error}"
+            ) from None
+        expected = variable.shape(self.mesh)
+        if array.shape != expected:
+            raise InvalidInput(
+                f"input '{variable.name}' of unit '{self.name}' got shape {array.shape}, expected {expected}"
+            )
+        if not np.isfinite(array).all():
+            where = np.argwhere(~np.isfinite(np.atleast_1d(array)))[0]
+            place = variable.location.value if variable.location is not Location.GLOBAL else "index"
+            raise InvalidInput(
+                f"input '{variable.name}' of unit '{self.name}' is not finite at {place} {where.tolist()}"
+            )
+        if variable.above is not None and array.size and not array.min() > variable.above:
+            raise InvalidInput(
+                f"input '{variable.name}' of unit '{self.name}' is {array.min():.6g} somewhere; "
+                f"it has to be above {variable.above:g}"
+            )
+        return array
+
+    def _parameter(self, name: str) -> Variable:
+        variable = self.variable(name)
+        if variable.causality is not Causality.PARAMETER:
+            raise InvalidInput(f"'{name}' is an {variable.causality.value} of unit '{self.name}', not a parameter")
+        return variable
+
+    def _sound(self, state: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        for name, value in state.items():
+            if not np.isfinite(value).all():
+                where = np.argwhere(~np.isfinite(np.atleast_1d(value)))[0]
+                raise StepFailure(f"'{name}' is not finite any more, first at index {where.tolist()}")
+            value.setflags(write=False)
+        return state
