@@ -1,0 +1,1 @@
+"""Packaging: any unit becomes an FMI 2.0 co-simulation FMU."""

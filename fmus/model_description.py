@@ -1,0 +1,196 @@
+"""The modelDescription.xml of a unit's FMU, from the unit's own declaration (FMI 2.0.4, section 2.2).
+
+Written as text: a field of thousands of scalars makes an XML tree of many megabytes otherwise.
+
+What depends on what. Outputs change in a step only; `dependencies` therefore names, for each output, the inputs that
+the step carries over to it. An output that follows all inputs everywhere has no such attribute, which by the standard
+means just that; a pointwise one (active stress) names the inputs at its own place; one without inputs (fibres) has
+the empty list.
+"""
+
+from collections.abc import Iterator
+from importlib.metadata import version
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ..units.input_ramp import INPUT_INTERPOLATION as INPUT_INTERPOLATION
+from ..units.mesh import Mesh
+from ..units.unit import Unit
+from ..units.variable import Causality, Location, Record
+from .layout import Run, layout
+from .slave import INVALID_INPUT
+
+#: Name under which the annotations that FMI has no place for (locations, recording) stand in VendorAnnotations.
+TOOL = "cardiac-cosim"
+
+#: SI base units and factor of every unit of measure that a variable may have.
+_UNITS: dict[str, dict[str, float]] = {
+    "1": {},
+    "deg": {"rad": 1, "factor": np.pi / 180.0},
+    "mm": {"m": 1, "factor": 1e-3},
+    "ml": {"m": 3, "factor": 1e-6},
+    "ms": {"s": 1, "factor": 1e-3},
+    "1/ms": {"s": -1, "factor": 1e3},
+    "mm2/ms": {"m": 2, "s": -1, "factor": 1e-3},
+    "mV": {"kg": 1, "m": 2, "s": -3, "A": -1, "factor": 1e-3},
+    "1/mV": {"kg": -1, "m": -2, "s": 3, "A": 1, "factor": 1e3},
+    "kPa": {"kg": 1, "m": -1, "s": -2, "factor": 1e3},
+    "MPa": {"kg": 1, "m": -1, "s": -2, "factor": 1e6},
+    "MPa/mV": {"m": -3, "s": 1, "A": 1, "factor": 1e9},
+}
+
+_CAPABILITIES = {
+    "needsExecutionTool": "false",
+    "canHandleVariableCommunicationStepSize": "true",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+}
+
+
+def model_description(unit: type[Unit], mesh: Mesh, guid: str) -> str:
+    """The XML text for `unit` on `mesh`."""
+    runs = layout(unit, mesh)
+    return "\n".join(
+        [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            _tag(
+                "fmiModelDescription",
+                fmiVersion="2.0",
+                modelName=unit.name,
+                guid=guid,
+                description=(unit.__doc__ or "").splitlines()[0],
+                version=version(TOOL),
+                license="BSD-3-Clause",
+                generationTool=f"{TOOL} {version(TOOL)} with PythonFMU {version('pythonfmu')}",
+                variableNamingConvention="structured",
+            ),
+            _tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
+            *_unit_definitions(runs),
+            "<LogCategories>",
+            _tag("Category", name="logStatusWarning", description="Messages with the status fmi2Warning", end=True),
+            _tag("Category", name="logStatusError", description="Messages with the status fmi2Error", end=True),
+            _tag("Category", name=INVALID_INPUT, description="Errors in what the caller gave", end=True),
+            "</LogCategories>",
+            _tag("DefaultExperiment", startTime="0", stopTime="0.32", stepSize="0.001", end=True),
+            *_annotations(unit, runs),
+            "<ModelVariables>",
+            *(line for run in runs for line in _scalars(run)),
+            "</ModelVariables>",
+            "<ModelStructure>",
+            "<Outputs>",
+            *_unknowns(runs, mesh),
+            "</Outputs>",
+            "<InitialUnknowns>",
+            *(
+                _tag("Unknown", index=str(run.first + 1 + k), end=True)
+                for run in _outputs(runs)
+                for k in range(run.size)
+            ),
+            "</InitialUnknowns>",
+            "</ModelStructure>",
+            "</fmiModelDescription>",
+            "",
+        ]
+    )
+
+
+def _tag(element: str, /, end: bool = False, **attributes: str) -> str:
+    text = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
+    return f"<{element}{text}{'/' if end else ''}>"
+
+
+def _outputs(runs: tuple[Run, ...]) -> list[Run]:
+    return [run for run in runs if run.variable.causality is Causality.OUTPUT]
+
+
+def _unit_definitions(runs: tuple[Run, ...]) -> Iterator[str]:
+    yield "<UnitDefinitions>"
+    for unit in sorted({run.variable.unit for run in runs if run.fmi_type == "Real"}):
+        base = {key: repr(value) for key, value in _UNITS[unit].items()}
+        yield _tag("Unit", name=unit) + _tag("BaseUnit", **base, end=True) + "</Unit>"
+    yield "</UnitDefinitions>"
+
+
+def _annotations(unit: type[Unit], runs: tuple[Run, ...]) -> Iterator[str]:
+    yield "<VendorAnnotations>"
+    yield _tag("Tool", name=TOOL) + _tag("Unit", name=unit.name, memoryless=str(unit.memoryless).lower())
+    for run in runs:
+        variable = run.variable
+        if variable.causality is Causality.PARAMETER:
+            continue
+        extra = {"needs": variable.needs} if variable.needs else {}
+        if variable.record is not Record.NOTHING:
+            extra["record"] = variable.record.value
+        yield _tag(
+            "Field",
+            name=variable.name,
+            location=variable.location.value,
+            fixed=str(variable.fixed).lower(),
+            **extra,
+            end=True,
+        )
+    yield "</Unit></Tool></VendorAnnotations>"
+
+
+def _scalars(run: Run) -> Iterator[str]:
+    variable = run.variable
+    # Of a float, as many digits as it takes to read the same one back.
+    start = quoteattr(str(variable.start))
+    unit = f" unit={quoteattr(variable.unit)}" if run.fmi_type == "Real" else ""
+    if variable.causality is Causality.PARAMETER:
+        kind = ' causality="parameter" variability="fixed" initial="exact"'
+        value = f"<{run.fmi_type} start={start}{unit}{_bounds(run)}/>"
+    elif variable.causality is Causality.INPUT:
+        kind = f' causality="input" variability="{"discrete" if variable.fixed else "continuous"}"'
+        value = f"<Real start={start}{unit}/>"
+    else:
+        kind = (
+            f' causality="output" variability="{"discrete" if variable.fixed else "continuous"}" initial="calculated"'
+        )
+        value = f"<Real{unit}/>"
+    described = f"{kind} description={quoteattr(variable.description)}>{value}</ScalarVariable>"
+    for reference, name in enumerate(run.names(), start=run.first):
+        yield f'<ScalarVariable name="{name}" valueReference="{reference}"{described}'
+
+
+def _bounds(run: Run) -> str:
+    # FMI's bounds are inclusive: an exclusive one (above) stays with the unit, which checks it.
+    return "" if run.variable.at_least is None else f' min="{run.variable.at_least:.17g}"'
+
+
+def _unknowns(runs: tuple[Run, ...], mesh: Mesh) -> Iterator[str]:
+    inputs = {run.variable.name: run for run in runs if run.variable.causality is Causality.INPUT}
+    for run in _outputs(runs):
+        followed = [inputs[name] for name in run.variable.depends_on]
+        if run.variable.pointwise:
+            places = [_places(source, run, mesh) for source in followed]
+            lists = [
+                " ".join(
+                    str(source.first + 1 + k) for source, at in zip(followed, places, strict=True) for k in at[place]
+                )
+                for place in range(run.size)
+            ]
+        elif len(followed) == len(inputs) > 0:
+            for k in range(run.size):
+                yield f'<Unknown index="{run.first + 1 + k}"/>'
+            continue
+        else:
+            all_of_them = " ".join(str(source.first + 1 + k) for source in followed for k in range(source.size))
+            lists = [all_of_them] * run.size
+        for k, dependencies in enumerate(lists):
+            yield f'<Unknown index="{run.first + 1 + k}" dependencies="{dependencies}"/>'
+
+
+def _places(source: Run, target: Run, mesh: Mesh) -> list[list[int]]:
+    """For each place of `target`, the places of `source` that lie there."""
+    if source.variable.location is target.variable.location:
+        return [[place] for place in range(target.size)]
+    if (source.variable.location, target.variable.location) != (Location.ELEMENT, Location.NODE):
+        raise NotImplementedError(f"pointwise from {source.variable.location} to {target.variable.location}")
+    elements = np.repeat(np.arange(mesh.elements), mesh.cells.shape[1])
+    around = csr_matrix((np.ones(len(elements)), (mesh.cells.ravel(), elements)), shape=(mesh.nodes, mesh.elements))
+    return [row.tolist() for row in np.split(around.indices, around.indptr[1:-1])]

@@ -1,0 +1,188 @@
+"""A mesh of twelve elements, its FMUs, a driver that knows FMI only, and what a unit does without FMI."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cardiac_cosim.fmus.build import build_fmu
+from cardiac_cosim.units.geometry import registry
+from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.registry import UNITS
+from cardiac_cosim.units.variable import Causality
+
+HERE = Path(__file__).parent
+
+_spec = importlib.util.spec_from_file_location("fmi_driver", HERE / "fmi_driver.py")
+assert _spec is not None
+assert _spec.loader is not None
+_fmi_driver = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(_fmi_driver)
+
+#: Parameters other than the defaults: of every FMI type, and such that every input matters.
+PARAMETERS: dict[str, dict[str, Any]] = {
+    "fiber_generator": {"endocardial_angle_deg": 51.5},
+    "electrophysiology": {"activation_time_map": "seed", "longest_substep_ms": 0.05},
+    "active_stress": {"length_dependence": 0.7, "delay_slope_per_mV": 0.5},
+    "mechanics": {"newton_iterations": 30, "shear_modulus_MPa": 0.3},
+}
+
+Fields = dict[str, np.ndarray]
+
+
+def _tiny() -> Mesh:
+    """The wall between two pyramids that stand on their heads: 4 + 1 nodes inside, 4 + 1 outside, 12 elements."""
+    corners = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], dtype=float)
+    points = np.vstack([20 * corners, [[0, 0, -50]], 30 * corners, [[0, 0, -65]]])
+    cells = []
+    for side in range(4):
+        # A prism cut in the order of its node numbers, so that neighbours agree on the diagonal between them.
+        a, b, c = sorted((side, (side + 1) % 4, 4))
+        cells += [[a, b, c, c + 5], [a, b, b + 5, c + 5], [a, a + 5, b + 5, c + 5]]
+    numbers = np.array(cells)
+    inverted = np.linalg.det(points[numbers[:, 1:]] - points[numbers[:, :1]]) < 0.0
+    numbers[inverted] = numbers[inverted][:, [0, 2, 1, 3]]
+    surface = Mesh(points, numbers).surface
+    inside, outside = (surface < 5).all(axis=1), (surface >= 5).all(axis=1)
+    left = points[surface].mean(axis=1)[:, 0] < 0.0
+    boundaries = {
+        "base": surface[~inside & ~outside],
+        "lv_endocardium": surface[inside],
+        "epicardium": surface[outside],
+        # No second chamber; but its boundaries have to be there, open at the base only.
+        "rv_endocardium": surface[outside & left],
+        "rv_septum": surface[outside & ~left],
+    }
+    return Mesh(points, numbers, boundaries)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A unit, what it is given, and what it does with it when called directly."""
+
+    unit: str
+    mesh: Mesh
+    parameters: dict[str, Any]
+    fixed: Fields
+    inputs: list[Fields]
+    #: Times and sizes of the steps in s: of different lengths, a zero one among them.
+    steps: tuple[tuple[float, float], ...] = ((0.0, 1e-3), (1e-3, 0.0), (1e-3, 2.5e-3), (3.5e-3, 1e-3))
+    expected: list[Fields] = field(default_factory=list)
+
+    def first(self) -> Fields:
+        return self.fixed | self.inputs[0]
+
+
+def _native(case: Case) -> list[Fields]:
+    kind = UNITS[case.unit]
+    unit = kind(case.mesh)
+    unit.instantiate(case.parameters)
+    unit.setup_experiment()
+    unit.enter_initialization_mode()
+    for name, values in case.first().items():
+        unit.set(name, values)
+    unit.exit_initialization_mode()
+    names = [variable.name for variable in kind.fields if variable.causality is Causality.OUTPUT]
+    seen = [{name: np.array(unit.get(name)) for name in names}]
+    for (time, size), inputs in zip(case.steps, case.inputs, strict=True):
+        for name, values in inputs.items():
+            unit.set(name, values)
+        unit.do_step(time, size)
+        seen.append({name: np.array(unit.get(name)) for name in names})
+    return seen
+
+
+def _cases(mesh: Mesh) -> dict[str, Case]:
+    fibers = _native(Case("fiber_generator", mesh, {}, {}, [{}] * 4))[0]
+    random = np.random.default_rng(7)
+    ranges = {"potential": (-80.0, 20.0), "stretch": (0.95, 1.05), "active_stress": (0.0, 5.0)}
+    cases = {}
+    for name, kind in UNITS.items():
+        taken = [variable for variable in kind.fields if variable.causality is Causality.INPUT]
+        fixed = {variable.name: fibers[variable.name] for variable in taken if variable.fixed}
+        varying = [variable for variable in taken if not variable.fixed]
+        inputs = [{v.name: random.uniform(*ranges[v.name], v.shape(mesh)) for v in varying} for _ in range(4)]
+        case = Case(name, mesh, PARAMETERS[name], fixed, inputs)
+        case.expected.extend(_native(case))
+        cases[name] = case
+    return cases
+
+
+@pytest.fixture(scope="session")
+def tiny() -> Mesh:
+    """The smallest mesh with all boundaries: 10 nodes, 12 elements."""
+    return _tiny()
+
+
+@pytest.fixture(scope="session")
+def cases(tiny: Mesh) -> dict[str, Case]:
+    """Of every unit, inputs for four steps on the tiny mesh, and its outputs when it is called without FMI."""
+    return _cases(tiny)
+
+
+@pytest.fixture(scope="session")
+def fmus(tiny: Mesh, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The FMUs of all units on the tiny mesh."""
+    folder = tmp_path_factory.mktemp("tiny")
+    return {name: build_fmu(unit, tiny, folder / f"{name}.fmu") for name, unit in UNITS.items()}
+
+
+@pytest.fixture(scope="session")
+def baseline() -> Mesh:
+    """The heart that is shipped, 5 mm."""
+    return registry.build("biventricle", 5.0)
+
+
+@pytest.fixture(scope="session")
+def baseline_fmus(baseline: Mesh, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The FMUs of all units on the baseline heart."""
+    folder = tmp_path_factory.mktemp("baseline")
+    return {name: build_fmu(unit, baseline, folder / f"{name}.fmu") for name, unit in UNITS.items()}
+
+
+@pytest.fixture
+def drive() -> Iterator[Callable[..., Any]]:
+    """Instantiate an FMU with the driver; freed when the test ends."""
+    drivers = []
+
+    def make(path: Path, instance: str = "driven") -> Any:
+        drivers.append(_fmi_driver.Driver(path, instance))
+        return drivers[-1]
+
+    yield make
+    for driver in drivers:
+        driver.close()
+
+
+@pytest.fixture(scope="session")
+def outside() -> Callable[..., str]:
+    """Run Python text in a process of its own that has FMPy and the driver but cannot import this project."""
+    preamble = f"""
+import sys
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] == "cardiac_cosim":
+            raise ImportError("this process knows nothing of the project")
+sys.meta_path.insert(0, Blocker())
+sys.path.insert(0, {str(HERE)!r})
+from fmi_driver import Driver
+"""
+
+    def run(text: str, *arguments: Any, block: bool = True) -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", (preamble if block else "") + text, *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+        )
+        assert done.returncode == 0, f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    return run

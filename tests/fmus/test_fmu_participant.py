@@ -1,0 +1,511 @@
+"""If these fail, the master misreads somebody else's FMU, blames the wrong unit, or leaves its files behind."""
+
+import inspect
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cardiac_cosim.fmus.build import build_fmu
+from cardiac_cosim.orchestrator.errors import InputError, ParticipantError
+from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
+from cardiac_cosim.orchestrator.participants.native import NativeParticipant
+from cardiac_cosim.orchestrator.participants.participant import Port
+from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.registry import UNITS
+from pythonfmu.builder import FmuBuilder
+
+_HEADER = """
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
+from pythonfmu.enums import Fmi2Status
+"""
+
+# Somebody else's FMUs, as plain PythonFMU makes them: no unit definitions, no annotations, no state.
+_FOREIGN = {
+    "Scalars": """
+class Scalars(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.u, self.y, self.gain, self.count, self.negate, self.mode = 0.5, 0.0, 2.0, 3, False, "plain"
+        parameter = dict(causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+        self.register_variable(Real("gain", **parameter))
+        self.register_variable(Integer("count", **parameter))
+        self.register_variable(Boolean("negate", **parameter))
+        self.register_variable(String("mode", **parameter))
+    def do_step(self, t, h):
+        self.y = self.u * self.gain * self.count * (-1 if self.negate else 1) + (100 if self.mode == "offset" else 0)
+        return True
+""",
+    # Declared backwards, with a stranger between the elements: neither order nor value references are consecutive.
+    "Arrays": """
+class Arrays(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.x = {(i, j): 0.0 for i in (1, 2) for j in (1, 2, 3)}
+        self.v = {k: 0.0 for k in range(1, 12)}
+        self.other = 7.0
+        def real(name, values, key, causality):
+            self.register_variable(Real(
+                name, causality=causality, getter=lambda: values[key], setter=lambda value: values.update({key: value})
+            ), nested=False)
+        for key in reversed(list(self.x)):
+            real(f"x[{key[0]},{key[1]}]", self.x, key, Fmi2Causality.input)
+            if key == (2, 1):
+                self.register_variable(Real("other", causality=Fmi2Causality.output))
+        for key in (10, 2, 1, 11, 3, 9, 8, 4, 5, 7, 6):
+            real(f"a.v[{key}]", self.v, key, Fmi2Causality.output)
+    def do_step(self, t, h):
+        for key in self.v:
+            self.v[key] = 1000.0 * key + 100 * self.x[1, 1] + 10 * self.x[1, 3] + self.x[2, 1]
+        return True
+""",
+    "Failing": """
+class Failing(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.mode = 0.0
+        self.register_variable(Real("mode", causality=Fmi2Causality.input))
+        self.register_variable(Real("mode2", causality=Fmi2Causality.output, getter=lambda: self.mode), nested=False)
+    def do_step(self, t, h):
+        if self.mode == 1:
+            raise RuntimeError("it went 100% wrong, %s")
+        if self.mode == 2:
+            return False
+        if self.mode == 3:
+            self.log("only 50% sure %s", Fmi2Status.error)
+        if self.mode == 4:
+            self.log("just so you know", Fmi2Status.warning)
+        if self.mode == 5:
+            self.log("x" * 9000 + " the end", Fmi2Status.error)
+        return True
+""",
+}
+
+
+# Can be built and described, but not instantiated.
+_MOODY = """
+class Moody(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        if self.instance_name != "dummyInstance":
+            raise RuntimeError("not today, 0% chance")
+    def do_step(self, t, h):
+        return True
+"""
+
+
+def _gapped(kind: str) -> str:
+    names = {
+        "missing": ["x[1]", "x[2]", "x[4]"],
+        "hole of a matrix": ["x[1,1]", "x[1,3]", "x[2,1]", "x[2,2]"],
+        "from zero": ["x[0]", "x[1]"],
+        "scalar and array": ["x", "x[1]"],
+        "mixed": ["x[1]", "x[1,1]"],
+        "wild": ["x[1]", "x[4000000000]"],
+    }[kind]
+    return f"""
+class Gapped(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        for name in {names}:
+            self.register_variable(Real(name, causality=Fmi2Causality.output, getter=lambda: 1.0), nested=False)
+    def do_step(self, t, h):
+        return True
+"""
+
+
+def _make(name: str, text: str, folder: Path) -> Path:
+    script = folder / f"{name.lower()}_script.py"
+    script.write_text(_HEADER + inspect.cleandoc(text) + "\n")
+    path, modules = list(sys.path), set(sys.modules)
+    try:
+        return FmuBuilder.build_FMU(script, folder / f"{name}.fmu")
+    finally:
+        sys.path[:] = path
+        for module in set(sys.modules) - modules:
+            if module == script.stem:
+                del sys.modules[module]
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("foreign")
+    return {name: _make(name, text, folder) for name, text in _FOREIGN.items()}
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder that temporary files go to in this test."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
+def join(temporary: Path) -> Iterator[Callable[..., FmuParticipant]]:
+    """Make a participant; closed when the test ends, and then nothing is left of it on disk or on the path."""
+    made: list[FmuParticipant] = []
+    path = list(sys.path)
+
+    def make(file: Path, name: str = "guest", **parameters: Any) -> FmuParticipant:
+        made.append(FmuParticipant(name, file, parameters))
+        return made[-1]
+
+    yield make
+    for participant in made:
+        participant.close()
+        # A second time does nothing.
+        participant.close()
+    assert list(temporary.iterdir()) == []
+    assert sys.path == path
+
+
+def _ready(participant: FmuParticipant) -> FmuParticipant:
+    participant.begin()
+    participant.complete()
+    return participant
+
+
+# --- this project's FMUs ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_ports_and_values_are_those_of_the_native_participant(
+    unit: str, cases: dict, fmus: dict, join: Callable[..., FmuParticipant]
+) -> None:
+    case = cases[unit]
+    native = NativeParticipant(unit, unit, case.mesh, case.parameters)
+    packaged = join(fmus[unit], unit, **case.parameters)
+    assert packaged.inputs == native.inputs
+    assert packaged.outputs == native.outputs
+    for participant in (native, packaged):
+        participant.begin()
+        for name, values in case.first().items():
+            participant.set(name, values)
+        participant.complete()
+    for step, inputs in zip(case.steps, case.inputs, strict=True):
+        for participant in (native, packaged):
+            for name, values in inputs.items():
+                participant.set(name, values)
+            participant.start(*step)
+        for name, port in packaged.outputs.items():
+            values = packaged.get(name)
+            assert values.shape == port.shape
+            np.testing.assert_array_equal(values, native.get(name))
+
+
+def test_an_input_that_does_not_matter_is_not_live(fmus: dict, join: Callable[..., FmuParticipant]) -> None:
+    assert not join(fmus["active_stress"]).inputs["stretch"].live
+    assert join(fmus["active_stress"], length_dependence=0.5).inputs["stretch"].live
+
+
+def test_what_get_returns_is_the_callers(fmus: dict, cases: dict, join: Callable[..., FmuParticipant]) -> None:
+    participant = _ready(join(fmus["active_stress"]))
+    first = participant.get("active_stress")
+    participant.set("potential", cases["active_stress"].inputs[0]["potential"])
+    participant.start(0.0, 1e-3)
+    second = participant.get("active_stress")
+    assert not first.any()
+    assert second.any()
+
+
+def test_a_failing_step_says_why(fmus: dict, tiny: Mesh, join: Callable[..., FmuParticipant]) -> None:
+    participant = _ready(join(fmus["active_stress"], delay_function="seed"))
+    participant.set("potential", np.full(tiny.nodes, 20.0))
+    for _ in range(2):
+        with pytest.raises(ParticipantError, match=r"at node 0 \(potential 20.0 mV\).*use delay_function: gompertz$"):
+            participant.start(0.0, 1e-3)
+
+
+@pytest.mark.parametrize("unit", ["mechanics", "fiber_generator"])
+def test_a_mesh_without_boundaries_is_the_persons_error(
+    unit: str, tiny: Mesh, cases: dict, tmp_path: Path, join: Callable[..., FmuParticipant]
+) -> None:
+    bare = Mesh(tiny.points, tiny.cells, {"lid": tiny.boundary("base")})
+    participant = join(build_fmu(UNITS[unit], bare, tmp_path / "bare.fmu"), "pump")
+    participant.begin()
+    for name, values in cases[unit].first().items():
+        participant.set(name, values)
+    with pytest.raises(InputError, match=r"^unit 'pump': the mesh has no boundary named '\w+' \(it has: lid\)"):
+        participant.complete()
+
+
+def test_no_state_to_start_from_is_not_the_persons_error(
+    fmus: dict, cases: dict, join: Callable[..., FmuParticipant]
+) -> None:
+    participant = join(fmus["mechanics"], neo_hooke_log_sign="seed")
+    participant.begin()
+    for name, values in cases["mechanics"].first().items():
+        participant.set(name, values)
+    with pytest.raises(ParticipantError, match="no stress-free state to start from"):
+        participant.complete()
+
+
+def test_wrong_parameters_of_our_own(fmus: dict, join: Callable[..., FmuParticipant]) -> None:
+    for name, value, message in (
+        (
+            "delay_function",
+            "100%",
+            r"'delay_function' of type String cannot be '100%': .* is '100%'; choose one of: gom",
+        ),
+        ("slow_rate_per_ms", -1.0, r"'slow_rate_per_ms' of type Real cannot be -1.0: .*> 0"),
+        ("length_dependence", "strong", "'length_dependence' of type Real cannot be 'strong'"),
+        ("slow_rate", 1.0, "has no parameter 'slow_rate'; did you mean 'slow_rate_per_ms'"),
+        ("potential", 1.0, "has no parameter 'potential'"),
+    ):
+        with pytest.raises(InputError, match=f"^unit 'guest'.*{message}"):
+            join(fmus["active_stress"], **{name: value})
+
+
+def test_a_field_of_the_wrong_shape_is_refused(fmus: dict, tiny: Mesh, join: Callable[..., FmuParticipant]) -> None:
+    participant = _ready(join(fmus["active_stress"]))
+    # NumPy would spread the first two over all nodes.
+    for values in (np.array(20.0), np.full(1, 20.0), np.full(tiny.nodes + 1, 20.0)):
+        with pytest.raises(ParticipantError, match=r"'potential' of unit 'guest' got shape .*expected \(10,\)"):
+            participant.set("potential", values)
+
+
+def test_not_finite_is_refused(fmus: dict, tiny: Mesh, join: Callable[..., FmuParticipant]) -> None:
+    participant = _ready(join(fmus["active_stress"]))
+    values = np.zeros(tiny.nodes)
+    values[6] = np.nan
+    with pytest.raises(ParticipantError, match=r"'potential' .* is not finite at node \[6\]"):
+        participant.set("potential", values)
+
+
+def test_messages_reach_the_participant_they_belong_to(
+    fmus: dict, foreign: dict, tiny: Mesh, join: Callable[..., FmuParticipant]
+) -> None:
+    one = _ready(join(fmus["active_stress"], "one", delay_function="seed"))
+    stranger = _ready(join(foreign["Failing"], "stranger"))
+    other = _ready(join(fmus["active_stress"], "other", delay_function="seed"))
+    for participant, potential in ((one, 10.0), (other, 20.0)):
+        participant.set("potential", np.full(tiny.nodes, potential))
+    stranger.set("mode", np.array(3.0))
+    for _ in range(2):
+        with pytest.raises(ParticipantError, match=r"10\.0 mV"):
+            one.start(0.0, 1e-3)
+        with pytest.raises(ParticipantError, match=r"^only 50% sure %s$"):
+            stranger.start(0.0, 1e-3)
+        with pytest.raises(ParticipantError, match=r"20\.0 mV"):
+            other.start(0.0, 1e-3)
+    one.close()
+    with pytest.raises(ParticipantError, match=r"20\.0 mV"):
+        other.start(0.0, 1e-3)
+
+
+# --- other people's FMUs ---------------------------------------------------------------------------------------------
+
+
+def test_scalars_without_units(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
+    participant = join(foreign["Scalars"])
+    assert participant.inputs == {"u": Port("u", None, (), "global", record="value")}
+    assert participant.outputs == {"y": Port("y", None, (), "global", record="value")}
+    _ready(participant)
+    participant.start(0.0, 0.1)
+    # With the start values of its own.
+    assert participant.get("y") == 0.5 * 2.0 * 3
+    participant.set("u", np.array(4.0))
+    participant.start(0.1, 0.1)
+    assert participant.get("y") == 4.0 * 2.0 * 3
+    assert participant.get("y").shape == ()
+
+
+def test_parameters_of_all_types(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
+    participant = _ready(join(foreign["Scalars"], gain=10, count=7, negate=True, mode="offset"))
+    participant.set("u", np.array(2.0))
+    participant.start(0.0, 0.1)
+    assert participant.get("y") == -2.0 * 10.0 * 7 + 100.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("gain", "2", "'gain' of type Real cannot be '2'"),
+        ("gain", True, "'gain' of type Real cannot be True"),
+        ("gain", None, "'gain' of type Real cannot be None"),
+        ("count", 2.5, "'count' of type Integer cannot be 2.5"),
+        ("count", True, "'count' of type Integer cannot be True"),
+        ("count", 2**32 + 3, "'count' of type Integer cannot be 4294967299"),
+        ("negate", 1, "'negate' of type Boolean cannot be 1"),
+        ("negate", "no", "'negate' of type Boolean cannot be 'no'"),
+        ("mode", 5, "'mode' of type String cannot be 5"),
+        ("mode", "off\0set", "'mode' of type String cannot be"),
+        ("gian", 1.0, "has no parameter 'gian'; did you mean 'gain'"),
+        ("u", 1.0, "has no parameter 'u'"),
+    ],
+)
+def test_wrong_parameters_of_others(
+    name: str, value: Any, message: str, foreign: dict, join: Callable[..., FmuParticipant]
+) -> None:
+    with pytest.raises(InputError, match=f"^unit 'guest'.*{message}"):
+        join(foreign["Scalars"], **{name: value})
+
+
+def test_arrays_in_any_order(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
+    participant = join(foreign["Arrays"])
+    assert {name: port.shape for name, port in participant.inputs.items()} == {"x": (2, 3)}
+    assert {name: port.shape for name, port in participant.outputs.items()} == {"other": (), "a.v": (11,)}
+    assert (participant.inputs["x"].unit, participant.inputs["x"].location) == (None, None)
+    assert participant.outputs["a.v"].record == "nothing"
+    _ready(participant)
+    participant.set("x", np.array([[1.0, -1.0, 3.0], [4.0, -1.0, -1.0]]))
+    participant.start(0.0, 0.1)
+    np.testing.assert_array_equal(participant.get("a.v"), 1000.0 * np.arange(1, 12) + 134.0)
+    assert participant.get("other") == 7.0
+
+
+@pytest.mark.parametrize("kind", ["missing", "hole of a matrix", "from zero", "scalar and array", "mixed", "wild"])
+def test_an_array_with_a_gap_is_refused(kind: str, tmp_path: Path, join: Callable[..., FmuParticipant]) -> None:
+    with pytest.raises(InputError, match=r"^unit 'guest': .*the FMU's variables x\[…\] do not fill an array of shape"):
+        join(_make("Gapped", _gapped(kind), tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("mode", "message"),
+    [
+        (1.0, r"it went 100% wrong, %s"),
+        (2.0, r"fmi2DoStep failed with status 2 \(discard\)\. The FMU logged no reason"),
+        (3.0, r"^only 50% sure %s$"),
+        (5.0, r"^x{9000} the end$"),
+    ],
+)
+def test_steps_that_fail_in_other_peoples_fmus(
+    mode: float, message: str, foreign: dict, join: Callable[..., FmuParticipant]
+) -> None:
+    participant = _ready(join(foreign["Failing"]))
+    participant.start(0.0, 0.1)
+    participant.set("mode", np.array(mode))
+    with pytest.raises(ParticipantError, match=message):
+        participant.start(0.1, 0.1)
+
+
+def test_a_warning_is_no_error(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
+    participant = _ready(join(foreign["Failing"]))
+    participant.set("mode", np.array(4.0))
+    participant.start(0.0, 0.1)
+    assert participant.get("mode2") == 4.0
+
+
+def test_after_a_fatal_error_the_fmu_is_not_touched_again(
+    foreign: dict, outside: Callable[..., str], join: Callable[..., FmuParticipant]
+) -> None:
+    participant = _ready(join(foreign["Failing"]))
+    participant.set("mode", np.array(1.0))
+    with pytest.raises(ParticipantError):
+        participant.start(0.0, 0.1)
+    for call in (lambda: participant.get("mode2"), lambda: participant.start(0.0, 0.1)):
+        with pytest.raises(ParticipantError, match="the FMU of unit 'guest' is closed"):
+            call()
+    # Many times in one process, which then ends as it should.
+    text = """
+import sys
+from pathlib import Path
+import numpy as np
+from cardiac_cosim.orchestrator.errors import ParticipantError
+from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
+for _ in range(20):
+    participant = FmuParticipant("guest", Path(sys.argv[1]), {})
+    participant.begin()
+    participant.complete()
+    participant.set("mode", np.array(1.0))
+    try:
+        participant.start(0.0, 0.1)
+    except ParticipantError:
+        participant.close()
+print("done")
+"""
+    assert outside(text, foreign["Failing"], block=False) == "done\n"
+
+
+# --- files that are no such FMU --------------------------------------------------------------------------------------
+
+
+def _edited(source: Path, target: Path, change: Callable[[str], str], drop: str = "nothing") -> Path:
+    """`source` with another model description and without the members whose name begins with `drop`."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                content = change(content.decode()).encode()
+            if not name.startswith(drop):
+                new.writestr(name, content)
+    return target
+
+
+def _damaged(source: Path, target: Path) -> Path:
+    """`source` with one byte changed in its largest member, behind the model description's back."""
+    with zipfile.ZipFile(source) as archive:
+        largest = max(archive.infolist(), key=lambda member: member.compress_size)
+    content = bytearray(source.read_bytes())
+    content[largest.header_offset + 200 + largest.compress_size // 2] ^= 255
+    target.write_bytes(content)
+    return target
+
+
+_FMI3 = """<?xml version="1.0"?>
+<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
+<CoSimulation modelIdentifier="m"/><ModelVariables><Float64 name="time" valueReference="0" causality="independent"/>
+</ModelVariables><ModelStructure/></fmiModelDescription>"""
+
+
+def _file(kind: str, source: Path, folder: Path) -> Path:
+    path = folder / "guest.fmu"
+    if kind == "missing":
+        return path
+    if kind == "folder":
+        return folder
+    if kind in ("text", "empty"):
+        path.write_text("this is no archive" if kind == "text" else "")
+    elif kind == "cut":
+        path.write_bytes(source.read_bytes()[:5000])
+    elif kind == "no description":
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("readme.txt", "hello")
+    elif kind == "damaged":
+        _damaged(source, path)
+    elif kind == "moody":
+        return _make("Moody", _MOODY, folder)
+    else:
+        change, drop = {
+            "FMI 3": (lambda text: _FMI3, "nothing"),
+            "model exchange": (lambda text: text.replace("CoSimulation", "ModelExchange"), "nothing"),
+            "no XML": (lambda text: text[:300], "nothing"),
+            "no binary": (lambda text: text, "binaries/"),
+        }[kind]
+        _edited(source, path, change, drop)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        ("missing", "no such FMU"),
+        ("folder", "no such FMU"),
+        ("text", "cannot read it as an FMU"),
+        ("empty", "cannot read it as an FMU"),
+        ("cut", "cannot read it as an FMU"),
+        ("no description", "cannot read it as an FMU"),
+        ("no XML", "cannot read it as an FMU"),
+        ("FMI 3", "not an FMI 2.0 co-simulation FMU"),
+        ("model exchange", "not an FMI 2.0 co-simulation FMU"),
+        ("damaged", "cannot be extracted .*CRC|cannot be extracted .*decompress"),
+        ("no binary", "cannot be instantiated: Cannot find shared library"),
+        ("moody", r"(?s)cannot be instantiated: .*not today, 0% chance"),
+    ],
+)
+def test_files_that_are_no_fmu_for_us(
+    kind: str, message: str, foreign: dict, tmp_path: Path, temporary: Path, join: Callable[..., FmuParticipant]
+) -> None:
+    path = _file(kind, foreign["Scalars"], tmp_path)
+    with pytest.raises(InputError, match=message) as refusal:
+        join(path)
+    assert str(refusal.value).startswith(f"unit 'guest': {path}: ")
+    assert list(temporary.iterdir()) == []
