@@ -1,0 +1,1 @@
+"""The coupling: connections, exchange of values, schemes, and the time loop."""

@@ -1,0 +1,208 @@
+"""The fields between the participants: their latest values, and their way from output to input.
+
+A unit that steps needs its inputs over the step. An output that has been computed for the step's end is known there;
+of another only the past is known, and it is extrapolated by a polynomial through the last exchanges (order 0: its last
+value). A unit that ramps its inputs gets their values at the begin and the end of its step; any other sees the value
+at the end, held. FMI 2.0 leaves open which time an input belongs to that is set before a step (its section 4.2.4 lets a
+master set what it likes); here it is always the step's end.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import ParticipantError
+from ..participants.participant import Participant, Ramp, Values
+from .connections import Connection, End
+from .history import History
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """How inputs behave between exchanges: order of their extrapolation, and whether units that can ramp them do."""
+
+    extrapolation: int = 0
+    linear: bool = False
+    #: Past values kept beyond what the extrapolation needs, for those who estimate errors.
+    depth: int = 1
+
+
+class Exchange:
+    """The latest values of all connected outputs. A step: `begin`, `feed` and `collect`, then `accept` or `undo`."""
+
+    def __init__(
+        self, participants: Mapping[str, Participant], connections: Iterable[Connection], inputs: Inputs | None = None
+    ) -> None:
+        self._participants = participants
+        self._connections = tuple(connections)
+        self._behaviour = inputs or Inputs()
+        self._depth = max(self._behaviour.extrapolation + 1, self._behaviour.depth)
+        self._values: dict[End, Values] = {}
+        self._before: dict[End, Values] = {}
+        self._histories: dict[End, History] = {}
+        # The connected inputs of each unit as they were when it was stepped last: where their ramps begin.
+        self._begins: dict[str, dict[End, Values]] = {}
+        self._known: set[End] = set()
+        self._collected: set[End] = set()
+        self._end = 0.0
+
+    @property
+    def moving(self) -> list[End]:
+        """The connected outputs that change with time."""
+        return list(self._histories)
+
+    # --- a step -------------------------------------------------------------------------------------------------------
+
+    def begin(self, end: float) -> None:
+        """A step to the time `end` (s) begins."""
+        self._end = end
+        self._before = dict(self._values)
+        self._known.clear()
+        self._collected.clear()
+
+    def accept(self, units: Iterable[str]) -> None:
+        """The step is over: the values are those at its end; `units` stepped."""
+        for end in self._collected:
+            self._remember(end)
+        for unit in units:
+            self._mark(unit)
+
+    def undo(self) -> None:
+        """The step is not taken: everything is as before `begin`."""
+        self._values = dict(self._before)
+        self._known.clear()
+        self._collected.clear()
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    def collect(self, unit: str, initially: bool = False) -> None:
+        """Fetch the connected outputs of `unit`; the fixed ones only `initially`."""
+        participant = self._participants[unit]
+        for end in dict.fromkeys(link.source for link in self._connections if link.source.unit == unit):
+            if initially or not participant.outputs[end.name].fixed:
+                self._values[end] = self._fetch(end)
+                self._known.add(end)
+                self._collected.add(end)
+                if initially and not participant.outputs[end.name].fixed:
+                    self._histories[end] = History(self._depth)
+                    self._remember(end)
+
+    def feed(self, unit: str, initially: bool = False) -> None:
+        """Set the connected inputs of `unit` for its step; the fixed ones only `initially`."""
+        participant = self._participants[unit]
+        ramps = self._behaviour.linear and participant.abilities.ramps and not initially
+        for link in self._connections:
+            if link.target.unit != unit or link.source not in self._values:
+                continue
+            fixed = participant.inputs[link.target.name].fixed or self._is_fixed(link.source)
+            if fixed and not initially:
+                continue
+            with blaming(unit):
+                if ramps:
+                    participant.ramp(link.target.name, self._ramp(unit, link.source))
+                else:
+                    participant.set(link.target.name, self._at_end(link.source))
+        if initially:
+            self._mark(unit)
+
+    def latest(self, end: End) -> Values:
+        """The value that connected inputs are fed with."""
+        return self._values[end]
+
+    def overwrite(self, values: Mapping[End, Values]) -> None:
+        """Feed connected inputs with `values`, as those at the step's end, until the outputs are collected again."""
+        self._values.update(values)
+        self._known.update(values)
+
+    def foretold(self, end: End, order: int | None = None) -> Values:
+        """What the past values say of an output at the step's end, by the inputs' order if none is given."""
+        return self._histories[end].extrapolated(self._end, self._behaviour.extrapolation if order is None else order)
+
+    def depth(self, end: End) -> int:
+        """How many past values of an output are known."""
+        return len(self._histories[end].samples())
+
+    def value(self, unit: str, name: str) -> Values:
+        """The value of an output at the latest exchange, fetched if it is not connected."""
+        end = End(unit, name)
+        return self._values[end] if end in self._values else self._fetch(end)
+
+    # --- checkpoints --------------------------------------------------------------------------------------------------
+
+    def memory(self) -> dict[str, Any]:
+        """All that `resume` needs, between two steps."""
+        return {
+            "values": {str(end): value for end, value in self._values.items() if end in self._histories},
+            "times": {
+                str(end): np.array([time for time, _ in history.samples()]) for end, history in self._histories.items()
+            },
+            "samples": {
+                str(end): np.stack([values for _, values in history.samples()])
+                for end, history in self._histories.items()
+            },
+            "begins": {
+                unit: {str(end): value for end, value in begins.items()} for unit, begins in self._begins.items()
+            },
+        }
+
+    def resume(self, memory: Mapping[str, Any]) -> None:
+        """Go on from what `memory` gave, after the initialisation."""
+        for end, history in self._histories.items():
+            self._values[end] = memory["values"][str(end)]
+            history.resume(list(zip(memory["times"][str(end)].tolist(), memory["samples"][str(end)], strict=True)))
+        sources = {str(link.source): link.source for link in self._connections}
+        for unit, begins in memory["begins"].items():
+            self._begins[unit] = {sources[name]: value for name, value in begins.items()}
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _at_end(self, source: End) -> Values:
+        if source in self._known or source not in self._histories:
+            return self._values[source]
+        return self.foretold(source)
+
+    def _ramp(self, unit: str, source: End) -> Ramp:
+        begin, end = self._begins[unit].get(source, self._values[source]), self._at_end(source)
+        if self._behaviour.extrapolation < 2:
+            return Ramp(begin, end)
+        known = source in self._known
+        return Ramp(begin, end, 0.0 * end if known else self._histories[source].curvature())
+
+    def _remember(self, end: End) -> None:
+        if end in self._histories:
+            self._histories[end].add(self._end, self._values[end])
+
+    def _mark(self, unit: str) -> None:
+        self._begins[unit] = {
+            link.source: self._values[link.source]
+            for link in self._connections
+            if link.target.unit == unit and link.source in self._values and not self._is_fixed(link.source)
+        }
+
+    def _is_fixed(self, end: End) -> bool:
+        return self._participants[end.unit].outputs[end.name].fixed
+
+    def _fetch(self, end: End) -> Values:
+        with blaming(end.unit):
+            values = self._participants[end.unit].get(end.name)
+            _check_finite(end, values)
+        return values
+
+
+@contextmanager
+def blaming(unit: str) -> Iterator[None]:
+    """A ParticipantError from inside is that of `unit`."""
+    try:
+        yield
+    except ParticipantError as error:
+        error.unit = error.unit or unit
+        raise
+
+
+def _check_finite(end: End, values: Values) -> None:
+    if not np.isfinite(values).all():
+        index = np.argwhere(~np.isfinite(np.atleast_1d(values)))[0].tolist()
+        raise ParticipantError(f"its output {end.name} is not finite, first at index {index}")

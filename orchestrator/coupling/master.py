@@ -1,0 +1,299 @@
+"""The master algorithm: initialisation and the coupled time loop over any participants.
+
+Whatever ends the loop, those who watch it (`Observer`) have seen every accepted step before.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from time import perf_counter
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import InputError, NotConverged, ParticipantError, ParticipantLost, RunError, did_you_mean
+from ..participants.participant import Participant, Wait
+from ..stopwatch import Span, Stopwatch, seconds_by_label
+from .connections import Connection, initial_order
+from .exchange import Exchange, Inputs, blaming
+from .rollback import Rollback
+from .schemes import Scheme, Sweeps
+from .step_control import FixedStep, StepControl
+from .timeline import Timeline
+
+_MS_PER_S = 1000.0
+
+#: Label of the time that no unit used: exchange, recording, bookkeeping.
+MASTER = "master"
+
+#: Label of the time in which the master waits for units.
+WAITING = "waiting"
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """What is known of a step that was accepted (step 0 is the initial state)."""
+
+    number: int
+    time_ms: float
+    size_ms: float
+    sweeps: Sweeps = field(default_factory=Sweeps)
+    rejected: int = 0
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    spans: tuple[Span, ...] = ()
+    is_output: bool = True
+    #: Units that did not step in this exchange: their outputs are those of an earlier time.
+    waiting: frozenset[str] = frozenset()
+
+
+class Observer(Protocol):
+    """Sees the state after the initialisation and after every accepted step."""
+
+    def accept(self, step: Accepted, exchange: Exchange) -> None:
+        """The outputs in `exchange` are those at `step.time_ms`."""
+
+
+class Master:
+    """Couples `participants` by `connections` with `scheme`.
+
+    Parameters
+    ----------
+    timeline:
+        The times at which steps may end.
+    order:
+        The stepping units in the order of the scheme; None takes the participants' order.
+    inputs:
+        How inputs behave between exchanges; held if not given.
+    control:
+        Chooses the steps; every tick of the timeline if not given. One that refuses steps needs units that roll back.
+    every:
+        Units that are stepped only at every so-many-th exchange, and at output times; the others at each.
+    """
+
+    def __init__(
+        self,
+        participants: Mapping[str, Participant],
+        connections: Sequence[Connection],
+        scheme: Scheme,
+        timeline: Timeline,
+        order: Sequence[str] | None = None,
+        inputs: Inputs | None = None,
+        control: StepControl | None = None,
+        every: Mapping[str, int] | None = None,
+    ) -> None:
+        self.participants = participants
+        self.connections = connections
+        self.units = stepping_order(participants, order)
+        self.exchange = Exchange(participants, connections, inputs)
+        self.watch = Stopwatch()
+        self._scheme = scheme
+        self._timeline = timeline
+        self._control = control or FixedStep()
+        self._every = every or {}
+        self._initialised = False
+        self._tick = 0
+        self._number = 0
+        # Where each unit's own time stands, and how many exchanges it has let pass.
+        self._reached = dict.fromkeys(self.units, 0)
+        self._passed = dict.fromkeys(self.units, 0)
+
+    @property
+    def done(self) -> bool:
+        """Whether the run is at its end."""
+        return self._tick >= self._timeline.stop
+
+    def initialise(self) -> None:
+        """Bring all units to their initial state, each after those that feed it.
+
+        Raises
+        ------
+        InputError
+            For what the person gave and only a unit can judge, a boundary that the mesh lacks for one.
+        RunError
+            Where a unit has no initial state.
+        """
+        static = [unit for unit in self.participants if unit not in self.units]
+        for unit in initial_order([*static, *self.units], self.connections):
+            measured = self.watch.measure(WAITING, "initialise"), self.watch.measure(unit, "initialise")
+            with measured[0], measured[1], _failing("failed at its initialisation"):
+                self._initialise(unit)
+        self._initialised = True
+
+    def run(self, observers: Sequence[Observer], stop: Any = False) -> None:
+        """Initialise, if that is not done yet, and step to the end, or until `stop` is true between two steps.
+
+        RunError names the unit, the time and why.
+        """
+        if not self._initialised:
+            self.initialise()
+        if self._number == 0:
+            with _failing("failed at its initialisation"):
+                self._show(Accepted(0, 0.0, 0.0, spans=self.watch.lap()), observers)
+        while not self.done and not stop:
+            accepted = self._take_step()
+            with _failing(*_told(accepted.time_ms - accepted.size_ms, accepted.time_ms)):
+                self._show(accepted, observers)
+
+    # --- checkpoints --------------------------------------------------------------------------------------------------
+
+    def memory(self) -> dict[str, Any]:
+        """All that `resume` needs to go on from here, to the bit; the states of the units as bytes.
+
+        ParticipantError where a unit cannot give its state away.
+        """
+        states = {}
+        for unit in self.units:
+            with blaming(unit):
+                states[unit] = np.frombuffer(self.participants[unit].pack(), np.uint8)
+        return {
+            "tick": self._tick,
+            "number": self._number,
+            "reached": dict(self._reached),
+            "passed": dict(self._passed),
+            "states": states,
+            "exchange": self.exchange.memory(),
+            "scheme": self._scheme.memory(),
+            "control": self._control.memory(),
+        }
+
+    def resume(self, memory: Mapping[str, Any]) -> None:
+        """Initialise, and go on from what `memory` gave, perhaps in another process."""
+        self.initialise()
+        for unit in self.units:
+            with blaming(unit), _failing("cannot go on from the checkpoint"):
+                self.participants[unit].unpack(memory["states"][unit].tobytes())
+            self._reached[unit] = int(memory["reached"][unit])
+            self._passed[unit] = int(memory["passed"][unit])
+        self._tick, self._number = int(memory["tick"]), int(memory["number"])
+        self.exchange.resume(memory["exchange"])
+        self._scheme.resume(memory.get("scheme", {}))
+        self._control.resume(memory.get("control", {}))
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _initialise(self, unit: str) -> None:
+        participant = self.participants[unit]
+        with blaming(unit):
+            participant.begin()
+        self.exchange.feed(unit, initially=True)
+        with blaming(unit):
+            participant.complete()
+        self.exchange.collect(unit, initially=True)
+
+    def _take_step(self) -> Accepted:
+        """Step until a step is good enough; shorter from one attempt to the next."""
+        rejected = 0
+        with self.watch.measure(MASTER, "step"):
+            while True:
+                ticks = self._control.next(self._tick)
+                begin, end = self._timeline.time_ms(self._tick), self._timeline.time_ms(self._tick + ticks)
+                units = self._due(ticks)
+                with _failing(*_told(begin, end)):
+                    sweeps = self._attempt(units, ticks, end)
+                if sweeps is not None:
+                    break
+                rejected += 1
+            self._tick += ticks
+            self._number += 1
+            self.exchange.accept(units)
+            for unit in self.units:
+                self._passed[unit] += 1
+            for unit in units:
+                self._reached[unit], self._passed[unit] = self._tick, 0
+        spans = self.watch.lap()
+        seconds = dict.fromkeys(self.units, 0.0) | seconds_by_label(spans)
+        seconds[MASTER] -= seconds.pop(WAITING, 0.0)
+        is_output = self._timeline.is_output(self._tick)
+        size, waiting = self._timeline.size_ms(ticks), frozenset(self.units) - frozenset(units)
+        return Accepted(self._number, end, size, sweeps, rejected, seconds, spans, is_output, waiting)
+
+    def _attempt(self, units: Sequence[str], ticks: int, end_ms: float) -> Sweeps | None:
+        """One step to `end_ms`; None if it was refused, and everything is as before."""
+        self.exchange.begin(end_ms / _MS_PER_S)
+        with Rollback(self.participants, units if self._control.refuses else ()) as before:
+            try:
+                sweeps = self._scheme.advance(units, self.exchange, partial(self._step, self._tick + ticks))
+                if self._control.good(self.exchange, ticks):
+                    return sweeps
+            except (ParticipantError, NotConverged) as error:
+                if isinstance(error, ParticipantLost) or not self._control.shorten(ticks):
+                    raise
+            before.restore()
+            self.exchange.undo()
+        return None
+
+    def _due(self, ticks: int) -> list[str]:
+        """The units that step in an exchange of so many ticks: at output times all of them."""
+        end = self._tick + ticks
+        if self._timeline.is_output(end) or end >= self._timeline.stop:
+            return list(self.units)
+        return [unit for unit in self.units if self._passed[unit] + 1 >= self._every.get(unit, 1)]
+
+    def _step(self, end: int, units: Sequence[str]) -> None:
+        """Step `units` at the same time, each from where it is to the tick `end`."""
+        started: list[tuple[str, float, float, Wait]] = []
+        failure: ParticipantError | None = None
+        with self.watch.measure(WAITING, "units"):
+            for unit in units:
+                begin, reached = perf_counter(), self._reached[unit]
+                time, size = self._timeline.time_ms(reached), self._timeline.size_ms(end - reached)
+                try:
+                    with blaming(unit):
+                        wait = self.participants[unit].start(time / _MS_PER_S, size / _MS_PER_S)
+                except ParticipantError as error:
+                    failure = failure or error
+                    self.watch.add(unit, "failed step", begin, perf_counter() - begin)
+                else:
+                    started.append((unit, begin, perf_counter() - begin, wait))
+            # All are waited for, even if one has failed: none may be busy when it is spoken to again.
+            for unit, begin, busy, wait in started:
+                try:
+                    with blaming(unit):
+                        elsewhere = wait()
+                    self.watch.add(unit, "step", begin, busy if elsewhere is None else elsewhere)
+                except ParticipantError as error:
+                    failure = failure or error
+                    self.watch.add(unit, "failed step", begin, perf_counter() - begin)
+        if failure is not None:
+            raise failure
+
+    def _show(self, step: Accepted, observers: Sequence[Observer]) -> None:
+        for observer in observers:
+            observer.accept(step, self.exchange)
+
+
+def _told(begin_ms: float, end_ms: float) -> tuple[str, str]:
+    """When a step failed, and what is left."""
+    return f"failed in the step from {begin_ms:g} to {end_ms:g} ms", f". The results up to {begin_ms:g} ms are complete"
+
+
+@contextmanager
+def _failing(when: str, consolation: str = "") -> Iterator[None]:
+    """Make a RunError of what a participant, or the coupling of them, could not do."""
+    try:
+        yield
+    except ParticipantError as error:
+        raise RunError(f"unit '{error.unit}' {when}: {error}{consolation}") from error
+    except NotConverged as error:
+        raise RunError(f"the coupling {when}: {error}{consolation}") from error
+
+
+def stepping_order(participants: Mapping[str, Participant], order: Sequence[str] | None) -> list[str]:
+    """The units that step: all but those whose outputs are fixed. InputError if `order` is no order of them."""
+    moving = [
+        name
+        for name, participant in participants.items()
+        if not participant.outputs or not all(port.fixed for port in participant.outputs.values())
+    ]
+    if order is None:
+        return moving
+    for name in order:
+        if name not in participants:
+            raise InputError(f"coupling.order: unknown unit '{name}'{did_you_mean(name, participants)}")
+    if len(set(order)) != len(order):
+        raise InputError("coupling.order: a unit is named twice")
+    missing = [name for name in moving if name not in order]
+    if missing:
+        raise InputError(f"coupling.order: {', '.join(missing)} is missing; name every unit that steps")
+    return [name for name in order if name in moving]

@@ -1,0 +1,44 @@
+"""The ways a run ends early, and the hint that goes with a misspelt name."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class InputError(Exception):
+    """What the person gave is wrong (exit code 2). The message names the file, the key and the remedy."""
+
+
+class RunError(Exception):
+    """The physics or the coupling failed (exit code 3). The message says which unit, when, why and what to try."""
+
+
+class Interrupted(Exception):
+    """Somebody asked the run to stop by the signal of number `signal`; the results so far are complete."""
+
+    def __init__(self, signal: int) -> None:
+        super().__init__(f"stopped by signal {signal}")
+        self.signal = signal
+
+
+class ParticipantError(Exception):
+    """A participant could not do what the master asked; the master adds when it was.
+
+    `unit` is the name of the participant, as soon as it is known.
+    """
+
+    unit: str | None = None
+
+
+class ParticipantLost(ParticipantError):
+    """A participant is gone for good: its process died, or it did not come back in time."""
+
+
+class NotConverged(Exception):
+    """The iteration of a loop found no solution of the step; the master adds when it was."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """`; did you mean 'x'?` with the nearest known name, or the list of all known ones."""
+    names = sorted(known)
+    near = get_close_matches(name, names, n=1, cutoff=0.5)
+    return f"; did you mean '{near[0]}'?" if near else f" (known: {', '.join(names) or 'none'})"

@@ -1,0 +1,1 @@
+"""What the master couples: the participant it sees, units called directly, and FMUs."""

@@ -1,0 +1,74 @@
+"""The log messages of FMUs, each brought to the participant it belongs to."""
+
+from ctypes import byref
+from typing import Any
+from weakref import WeakValueDictionary
+
+from fmpy.fmi2 import (
+    calloc,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    free,
+)
+from fmpy.logging import addLoggerProxy
+
+from ...fmus.slave import INVALID_INPUT
+
+#: fmi2Status from which a message tells of a failure.
+_ERROR = 3
+
+
+class FmuLog:
+    """The errors that one FMU has logged since the last `clear`, and the callbacks through which it logs them.
+
+    Parameters
+    ----------
+    formats:
+        Whether messages are printf formats, as FMI 2.0 has it. PythonFMU never gives arguments and its users' messages
+        are no formats: a percent sign in one would make the reader of formats end the process.
+    """
+
+    def __init__(self, formats: bool) -> None:
+        self._formats = formats
+        self.errors: list[str] = []
+        self.blames_input = False
+        self.callbacks = fmi2CallbackFunctions()
+        self.callbacks.logger = _LOGGER
+        self.callbacks.componentEnvironment = id(self)
+        _LOGS[id(self)] = self
+        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        if formats:
+            addLoggerProxy(byref(self.callbacks))
+
+    def clear(self) -> None:
+        """Forget what was logged."""
+        self.errors.clear()
+        self.blames_input = False
+
+    def hear(self, status: int, category: bytes, message: bytes) -> None:
+        """Take a message; errors are kept until the call that caused them returns."""
+        if status >= _ERROR:
+            if not self._formats:
+                message = message.replace(b"%%", b"%")
+            self.errors.append(message.decode("utf-8", errors="replace"))
+            self.blames_input = category == INVALID_INPUT.encode()
+
+    def __str__(self) -> str:
+        return "; ".join(self.errors)
+
+
+#: The log of each FMU, by the address given to it as component environment.
+_LOGS: WeakValueDictionary[int, FmuLog] = WeakValueDictionary()
+
+
+def _route(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> Any:
+    log = _LOGS.get(environment or 0)
+    if log is not None:
+        log.hear(status, category or b"", message or b"")
+
+
+# One function for all FMUs: FMPy's proxy, which fills in printf arguments, keeps only the one it was given last.
+_LOGGER = fmi2CallbackLoggerTYPE(_route)

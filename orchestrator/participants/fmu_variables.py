@@ -1,0 +1,156 @@
+"""What an FMU declares: its fields as ports, its parameters, from the model description."""
+
+import re
+import zipfile
+from collections.abc import Callable, Iterable
+from ctypes import c_double
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy.fmi2 import fmi2ValueReference
+from lxml import etree
+
+from ...fmus.model_description import INPUT_INTERPOLATION, TOOL
+from ..errors import InputError, did_you_mean
+from .participant import Parameters, Port
+
+_INDEXED = re.compile(r"^(.*)\[(\d+(?:,\d+)*)\]$")
+#: How FMI calls an initial value that the caller may give.
+_STARTED = ("exact", "approx")
+#: What may be given for a parameter of an FMI type. (To Python a truth value is a number; to a person it is not.)
+_ACCEPTED: dict[str, Callable[[Any], bool]] = {
+    "Real": lambda value: isinstance(value, (int, float)) and not isinstance(value, bool),
+    "Integer": lambda value: isinstance(value, int) and not isinstance(value, bool) and -(2**31) <= value < 2**31,
+    "Boolean": lambda value: isinstance(value, bool),
+    "String": lambda value: isinstance(value, str) and "\0" not in value,
+}
+
+
+class Field:
+    """A port of an FMU with its value references and values, as the raw FMI calls want them."""
+
+    def __init__(self, port: Port, references: list[int]) -> None:
+        self.port = port
+        self.size = len(references)
+        self.references = (fmi2ValueReference * self.size)(*references)
+        self.buffer = (c_double * self.size)()
+        self.values = np.ctypeslib.as_array(self.buffer).reshape(port.shape)
+
+
+def scalar_type(variable: Any) -> str:
+    """The FMI 2.0 type by which a variable is set; an enumeration is set as an Integer (FMI 2.0.4, section 2.2.7)."""
+    return "Integer" if variable.type == "Enumeration" else str(variable.type)
+
+
+def check_parameters(parameters: Parameters, variables: Iterable[Any]) -> None:
+    """InputError for a parameter that the FMU does not have, or that cannot have the value given."""
+    declared = {
+        variable.name: variable
+        for variable in variables
+        if variable.causality == "parameter" and variable.variability != "constant"
+    }
+    for name, value in parameters.items():
+        if name not in declared:
+            raise InputError(f"the FMU has no parameter '{name}'{did_you_mean(name, declared)}")
+        _check_type(f"parameter '{name}'", declared[name], value)
+
+
+def check_start(start: Parameters, variables: Iterable[Any]) -> None:
+    """InputError for a start value that the FMU's variable cannot have, or that is none to be given.
+
+    Start values are those of inputs, and of outputs and locals whose initial value is exact or approximate.
+    """
+    declared = {
+        variable.name: variable
+        for variable in variables
+        if variable.causality == "input" or (variable.causality != "parameter" and variable.initial in _STARTED)
+    }
+    for name, value in start.items():
+        if name not in declared:
+            raise InputError(f"the FMU has no variable '{name}' that takes a start value{did_you_mean(name, declared)}")
+        _check_type(f"start value of '{name}'", declared[name], value)
+
+
+def _check_type(what: str, variable: Any, value: Any) -> None:
+    kind = scalar_type(variable)
+    if not _ACCEPTED[kind](value):
+        raise InputError(f"{what} of type {kind} cannot be {value!r}")
+
+
+def declares_ramps(variables: Iterable[Any]) -> bool:
+    """Whether the FMU can ramp its inputs by itself, as this project's do, and has the parameter that says so."""
+    return any(variable.name == INPUT_INTERPOLATION and variable.type == "String" for variable in variables)
+
+
+def ramps_itself(variables: Iterable[Any], parameters: Parameters) -> bool:
+    """Whether that parameter says `linear`."""
+    return any(
+        variable.name == INPUT_INTERPOLATION and parameters.get(variable.name, variable.start) == "linear"
+        for variable in variables
+    )
+
+
+def real_fields(path: Path, variables: Iterable[Any], parameters: Parameters) -> tuple[list[Field], list[Field]]:
+    """The Real inputs and outputs of the FMU at `path`, scalars `x[1]`, `x[2]`, … taken together as one field.
+
+    `variables` are those of FMPy's model description. InputError if the indices of a field do not fill an array.
+    """
+    groups: dict[tuple[str, str], list[tuple[tuple[int, ...], Any]]] = {}
+    values: dict[str, Any] = {}
+    for variable in variables:
+        values[variable.name] = parameters.get(variable.name, variable.start)
+        if variable.causality in ("input", "output") and variable.type == "Real":
+            match = _INDEXED.match(variable.name)
+            name = match[1] if match else variable.name
+            index = tuple(map(int, match[2].split(","))) if match else ()
+            groups.setdefault((variable.causality, name), []).append((index, variable))
+    annotations = _annotations(path)
+    fields: dict[str, list[Field]] = {"input": [], "output": []}
+    for (causality, name), members in groups.items():
+        members.sort(key=lambda member: member[0])
+        shape = members[-1][0]
+        indices = [index for index, _ in members]
+        # Counted first: a wild index is not to make a list of its size.
+        if len(indices) != prod(shape) or indices != list(product(*(range(1, count + 1) for count in shape))):
+            raise InputError(f"the FMU's variables {name}[…] do not fill an array of shape {shape} with indices from 1")
+        extra = annotations.get(name, {})
+        port = Port(
+            name,
+            members[0][1].unit,
+            shape,
+            extra.get("location", None if shape else "global"),
+            extra.get("fixed") == "true" or members[0][1].variability in ("constant", "fixed"),
+            live="needs" not in extra or float(values[extra["needs"]]) != 0.0,
+            record=extra.get("record", "nothing" if shape else "value"),
+            needs=extra.get("needs"),
+        )
+        fields[causality].append(Field(port, [variable.valueReference for _, variable in members]))
+    return fields["input"], fields["output"]
+
+
+def is_memoryless(path: Path) -> bool:
+    """Whether the FMU says that its outputs follow its inputs whatever was before; only this project's do."""
+    tool = _tool(path)
+    unit = None if tool is None else tool.find("Unit")
+    return unit is not None and unit.get("memoryless") == "true"
+
+
+def _annotations(path: Path) -> dict[str, dict[str, str]]:
+    """What this project's FMUs say of their fields beyond FMI: attributes by name; empty for foreign FMUs."""
+    tool = _tool(path)
+    return {} if tool is None else {field.get("name"): dict(field.attrib) for field in tool.iter("Field")}
+
+
+def _tool(path: Path) -> Any:
+    """This project's element of the FMU's annotations; None in foreign FMUs."""
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as text:
+        # The annotations come before the variables; nothing after them is parsed.
+        for _, element in etree.iterparse(text, tag=("Tool", "ScalarVariable")):
+            if element.tag == "ScalarVariable":
+                return None
+            if element.get("name") == TOOL:
+                return element
+    return None

@@ -1,0 +1,161 @@
+"""The one door to the units' floor: meshes, declarations, and units as participants without FMI."""
+
+from pathlib import Path
+
+from ...fmus.cache import cached_fmu
+from ...units.errors import InvalidInput, StepFailure
+from ...units.geometry.registry import build as build_geometry
+from ...units.input_ramp import INPUT_INTERPOLATION
+from ...units.mesh import Mesh
+from ...units.mesh.file import read_mesh
+from ...units.mesh.quality import signed_inverse_condition_number
+from ...units.registry import UNITS
+from ...units.snapshot import Snapshot
+from ...units.unit import Unit
+from ...units.variable import Causality, Variable
+from ..errors import InputError, ParticipantError, did_you_mean
+from ..scenario import Scene
+from .participant import Abilities, Parameters, Port, Ramp, Values, Wait
+from .ramping import PendingRamps
+
+__all__ = ["Mesh", "NativeParticipant", "check_unit", "element_quality", "fmu_of_unit", "scene_mesh", "unit_ports"]
+
+
+def scene_mesh(scene: Scene, folder: Path) -> Mesh:
+    """The mesh of `scene`; a mesh file's path is relative to `folder`. InputError if there is none to be had."""
+    try:
+        if scene.mesh is not None:
+            return read_mesh(folder / scene.mesh)
+        return build_geometry(str(scene.geometry), scene.mesh_size_mm)
+    except InvalidInput as error:
+        raise InputError(str(error)) from None
+
+
+def check_unit(unit: str, parameters: Parameters) -> None:
+    """InputError if there is no such unit, or if it has no such parameter or none with such a value."""
+    if unit not in UNITS:
+        raise InputError(f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}")
+    declared = {
+        variable.name: variable for variable in UNITS[unit].variables() if variable.causality is Causality.PARAMETER
+    }
+    for name, value in parameters.items():
+        if name not in declared:
+            raise InputError(f"unit '{unit}' has no parameter '{name}'{did_you_mean(name, declared)}")
+        try:
+            declared[name].checked(value)
+        except InvalidInput as error:
+            raise InputError(str(error)) from None
+
+
+def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[dict[str, Port], dict[str, Port]]:
+    """Inputs and outputs of a unit on `mesh`, by name."""
+    kind = UNITS[unit]
+    given = {variable.name: parameters.get(variable.name, variable.start) for variable in kind.variables()}
+
+    def port(variable: Variable) -> Port:
+        return Port(
+            variable.name,
+            variable.unit,
+            variable.shape(mesh),
+            variable.location.value,
+            variable.fixed,
+            variable.needs is None or bool(given[variable.needs]),
+            variable.record.value,
+            variable.needs,
+        )
+
+    inputs = {item.name: port(item) for item in kind.fields if item.causality is Causality.INPUT}
+    outputs = {item.name: port(item) for item in kind.fields if item.causality is Causality.OUTPUT}
+    return inputs, outputs
+
+
+def element_quality(mesh: Mesh) -> Values:
+    """SICN of each tetrahedron, shape (elements,)."""
+    return signed_inverse_condition_number(mesh)
+
+
+def fmu_of_unit(unit: str, mesh: Mesh, fmu_dir: Path | None) -> Path:
+    """The FMU of a unit on `mesh`: from the cache if it is there, built otherwise."""
+    return cached_fmu(UNITS[unit], mesh, fmu_dir)
+
+
+class NativeParticipant:
+    """A unit called directly."""
+
+    def __init__(self, name: str, unit: str, mesh: Mesh, parameters: Parameters, ramps: bool = False) -> None:
+        self.name = name
+        if ramps and any(variable.name == INPUT_INTERPOLATION for variable in UNITS[unit].variables()):
+            parameters = {INPUT_INTERPOLATION: "linear"} | parameters
+        self.inputs, self.outputs = unit_ports(unit, mesh, parameters)
+        self._unit: Unit = UNITS[unit](mesh)
+        try:
+            self._unit.instantiate(parameters)
+        except InvalidInput as error:
+            raise InputError(f"unit '{name}': {error}") from None
+        self.abilities = Abilities(
+            ramps=parameters.get(INPUT_INTERPOLATION) == "linear", memoryless=UNITS[unit].memoryless
+        )
+        self._pending = PendingRamps()
+
+    def begin(self) -> None:
+        """See Participant."""
+        self._unit.setup_experiment()
+        self._unit.enter_initialization_mode()
+
+    def complete(self) -> None:
+        """See Participant."""
+        try:
+            self._unit.exit_initialization_mode()
+        except InvalidInput as error:
+            raise InputError(f"unit '{self.name}': {error}") from None
+        except StepFailure as error:
+            raise ParticipantError(str(error)) from error
+
+    def set(self, name: str, values: Values) -> None:
+        """See Participant."""
+        try:
+            self._unit.set(name, values)
+        except InvalidInput as error:
+            raise ParticipantError(str(error)) from error
+
+    def ramp(self, name: str, ramp: Ramp) -> None:
+        """See Participant; the curvature is beyond the units."""
+        self._pending.add(name, ramp)
+
+    def get(self, name: str) -> Values:
+        """See Participant."""
+        return self._unit.get(name)  # type: ignore[no-any-return]
+
+    def start(self, time: float, size: float) -> Wait:
+        """See Participant; the step is done when this returns."""
+        self._pending.apply(self.set, lambda: self._step(time, 0.0))
+        self._step(time, size)
+        return lambda: None
+
+    def _step(self, time: float, size: float) -> None:
+        try:
+            self._unit.do_step(time, size)
+        except (InvalidInput, StepFailure) as error:
+            raise ParticipantError(str(error)) from error
+
+    def save(self) -> Snapshot:
+        """See Participant."""
+        return self._unit.get_state()
+
+    def restore(self, state: Snapshot) -> None:
+        """See Participant."""
+        self._unit.set_state(state)
+
+    def free(self, state: Snapshot) -> None:
+        """See Participant; nothing is held but by the caller."""
+
+    def pack(self) -> bytes:
+        """See Participant."""
+        return self._unit.get_state().to_bytes()
+
+    def unpack(self, data: bytes) -> None:
+        """See Participant."""
+        self._unit.set_state(Snapshot.from_bytes(data))
+
+    def close(self) -> None:
+        """See Participant."""

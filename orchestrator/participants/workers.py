@@ -1,0 +1,204 @@
+"""Participants that work at the same time: each an actor of Dask's, in a thread or a process of its own, or elsewhere.
+
+A process costs about a millisecond per call, and its death takes nobody else along. On other machines this project has
+to be installed in the same version; FMUs are sent there.
+"""
+
+import os
+import signal
+from contextlib import suppress
+from itertools import cycle
+from time import perf_counter
+from types import TracebackType
+from typing import Any
+
+from distributed import Client, LocalCluster
+from distributed.actor import ActorFuture
+
+from ..errors import InputError, ParticipantError, ParticipantLost
+from .participant import Abilities, Participant, Port, Ramp, Values, Wait
+from .recipe import Recipe
+
+#: How long to wait for a scheduler, or for an actor to be set up, in seconds.
+_PATIENCE_S = 300.0
+
+#: How long Dask may take to close, in seconds.
+_CLOSING_S = 5.0
+
+
+class Workers:
+    """Where actors are made, one worker for each of `count`; `where` is `threads`, `processes` or an address."""
+
+    def __init__(self, where: str, count: int, limit_s: float | None) -> None:
+        self._where = where
+        self._limit_s = limit_s
+        self._cluster: LocalCluster | None = None
+        try:
+            if where in ("threads", "processes"):
+                self._cluster = LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    processes=where == "processes",
+                    dashboard_address=None,
+                    silence_logs=40,
+                    memory_limit=0,
+                )
+            self._client = Client(self._cluster or where, timeout=10.0)
+            workers = sorted(self._client.scheduler_info(n_workers=-1)["workers"])
+        except OSError as error:
+            raise InputError(f"run.workers: no Dask scheduler answers at {where} ({error})") from None
+        if not workers:
+            self._client.close()
+            raise InputError(f"run.workers: the scheduler at {where} has no workers; start some: dask worker {where}")
+        # Units share workers only where there are fewer workers than units.
+        self._next = cycle(workers)
+
+    def make(self, recipe: Recipe) -> Participant:
+        """The participant of `recipe`, in the next worker."""
+        sent = recipe if self._cluster is not None else recipe.portable()
+        address = next(self._next)
+        future = self._client.submit(_Host, sent, actor=True, workers=[address], pure=False)
+        try:
+            actor = future.result(timeout=_PATIENCE_S)
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"run.workers: unit '{recipe.name}' could not be set up at {address}: {error}") from None
+        return RemoteParticipant(recipe.name, actor, self._limit_s)
+
+    def __enter__(self) -> "Workers":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._cluster is not None and self._where == "processes":
+            # Dask would wait for a unit that hangs. Nothing is lost: whoever leaves here has closed the participants.
+            for nanny in self._cluster.workers.values():
+                nanny.auto_restart = False
+                with suppress(ProcessLookupError, TypeError):
+                    os.kill(nanny.pid, signal.SIGKILL)
+        self._client.close(timeout=_CLOSING_S)
+        if self._cluster is not None:
+            self._cluster.close(timeout=_CLOSING_S)
+
+
+class _Host:
+    """The actor: holds the participant where it works, and its saved states, which stay there."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self._participant = recipe.make()
+        self._states: dict[int, Any] = {}
+        self._saved = 0
+
+    def describe(self) -> tuple[dict[str, Port], dict[str, Port], Abilities]:
+        participant = self._participant
+        return participant.inputs, participant.outputs, participant.abilities
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        return getattr(self._participant, name)(*arguments)
+
+    def step(self, time: float, size: float) -> float:
+        begin = perf_counter()
+        self._participant.start(time, size)()
+        return perf_counter() - begin
+
+    def save(self) -> int:
+        self._saved += 1
+        self._states[self._saved] = self._participant.save()
+        return self._saved
+
+    def restore(self, number: int) -> None:
+        self._participant.restore(self._states[number])
+
+    def free(self, number: int) -> None:
+        self._participant.free(self._states.pop(number))
+
+
+class RemoteParticipant:
+    """Stands for a participant in another thread, process or machine. A step is started there and waited for here."""
+
+    def __init__(self, name: str, actor: Any, limit_s: float | None) -> None:
+        self.name = name
+        self._actor = actor
+        self._limit_s = limit_s
+        self.inputs, self.outputs, self.abilities = self._result(actor.describe())
+
+    def begin(self) -> None:
+        """See Participant."""
+        self._call("begin")
+
+    def complete(self) -> None:
+        """See Participant."""
+        self._call("complete")
+
+    def set(self, name: str, values: Values) -> None:
+        """See Participant."""
+        self._call("set", name, values)
+
+    def ramp(self, name: str, ramp: Ramp) -> None:
+        """See Participant."""
+        self._call("ramp", name, ramp)
+
+    def get(self, name: str) -> Values:
+        """See Participant."""
+        values: Values = self._call("get", name)
+        return values
+
+    def start(self, time: float, size: float) -> Wait:
+        """See Participant."""
+        future = self._ask("step", time, size)
+        return lambda: float(self._result(future))
+
+    def save(self) -> int:
+        """See Participant; the state stays where it is, and has a number here."""
+        return int(self._result(self._ask("save")))
+
+    def restore(self, state: int) -> None:
+        """See Participant."""
+        self._result(self._ask("restore", state))
+
+    def free(self, state: int) -> None:
+        """See Participant; a worker that is lost has lost its states as well."""
+        with suppress(ParticipantLost):
+            self._result(self._ask("free", state))
+
+    def pack(self) -> bytes:
+        """See Participant."""
+        return bytes(self._call("pack"))
+
+    def unpack(self, data: bytes) -> None:
+        """See Participant."""
+        self._call("unpack", data)
+
+    def close(self) -> None:
+        """See Participant."""
+        with suppress(ParticipantError):
+            self._call("close")
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        return self._result(self._ask("call", name, *arguments))
+
+    def _ask(self, method: str, *arguments: Any) -> ActorFuture[Any]:
+        try:
+            return getattr(self._actor, method)(*arguments)
+        # What Dask raises of an actor whose worker is known to be gone.
+        except (RuntimeError, OSError) as error:
+            raise self._lost() from error
+
+    def _result(self, future: ActorFuture[Any]) -> Any:
+        try:
+            return future.result(timeout=self._limit_s)
+        except (ParticipantError, InputError):
+            raise
+        except TimeoutError as error:
+            raise ParticipantLost(
+                f"it did not come back within {self._limit_s:g} s (run.unit_time_limit_s); "
+                "raise the limit if that is no sign of a hang"
+            ) from error
+        except (RuntimeError, OSError) as error:
+            raise self._lost() from error
+
+    @staticmethod
+    def _lost() -> ParticipantLost:
+        return ParticipantLost("the process it worked in is gone; what it wrote last may say why")

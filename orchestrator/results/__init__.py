@@ -1,0 +1,1 @@
+"""What a run leaves behind: time series, fields, coupling log, summary and figures."""

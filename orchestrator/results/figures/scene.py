@@ -1,0 +1,165 @@
+"""Bodies in space on matplotlib's 3-D axes: shaded triangles and strokes, sorted by depth, in parallel projection.
+
+Matplotlib sorts polygons by the depth of their centres and colours each one evenly. Faces are therefore cut into small
+pieces, those seen from behind are left out, and strokes are thin triangles in the same collection: only so walls hide
+the strokes behind them.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from ...participants.participant import Values
+
+# Faces are quartered up to so many times: while they are few, where the cut goes through, and where a face has
+# different colours, by this part of the colour bar.
+_ROUNDS, _FEW, _SHADE = 3, 4_000, 0.04
+
+# Lines are cut into so many pieces.
+_PARTS = 4
+
+# Towards the light, as right, up and towards the eye: over the viewer's left shoulder.
+_LIGHT = np.array([-0.35, 0.35, 0.87]) / np.linalg.norm([-0.35, 0.35, 0.87])
+
+# Brightness in full shadow; high, because the colour carries the value and must be read everywhere.
+_AMBIENT = 0.7
+
+# With this zoom the limits of the axes in orthographic projection fill them but for a small margin.
+_ZOOM = 1.6
+
+# Lengths of the scale bar in mm.
+_BARS_MM = tuple(base * 10.0**power for power in range(-2, 4) for base in (1.0, 2.0, 5.0))
+
+
+class Painted(NamedTuple):
+    """Triangles in mm, shape (n, 3, 3), and their red, green and blue from 0 to 1, shape (n, 3)."""
+
+    corners: Values
+    rgb: Values
+
+
+@dataclass(frozen=True)
+class View:
+    """Parallel projection from the direction `azimuth_deg` counterclockwise of X, `elevation_deg` above horizontal.
+
+    What lies beyond `cut_mm` in the direction of the unit vector `away` is cut off.
+    """
+
+    azimuth_deg: float
+    elevation_deg: float
+    away: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    cut_mm: float = math.inf
+
+    @cached_property
+    def axes(self) -> Values:
+        """Unit vectors to the right, upward and towards the eye as rows, shape (3, 3)."""
+        around, above = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
+        right = np.array([-math.sin(around), math.cos(around), 0.0])
+        toward = np.array([math.cos(above) * math.cos(around), math.cos(above) * math.sin(around), math.sin(above)])
+        return np.array([right, np.cross(toward, right), toward])
+
+    def beyond(self, points: Values) -> Values:
+        """Distance beyond the cut in mm of points of shape (..., 3); negative for what is shown."""
+        return np.asarray(points @ np.array(self.away) - self.cut_mm)
+
+    def extent(self, points: Values) -> tuple[Values, float]:
+        """Middle, shape (3,), and half the larger side of the picture of `points`, shape (n, 3), all in mm.
+
+        Points beyond the cut do not count, those on its rim do.
+        """
+        seen = points[self.beyond(points) <= 1e-6] @ self.axes.T
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        return 0.5 * (low + high) @ self.axes, 0.5 * float((high - low)[:2].max())
+
+
+def shaded(
+    view: View, corners: Values, values: Values, normals: Values, colors: ScalarMappable, white: float = 0.0
+) -> Painted:
+    """Faces of a closed surface that face the eye, lit, in small pieces.
+
+    Parameters
+    ----------
+    corners:
+        In mm, shape (faces, 3, 3).
+    values:
+        At the corners, shape (faces, 3), interpolated in between.
+    normals:
+        Outward unit normals at the corners, shape (faces, 3, 3).
+    colors:
+        The colours of the values.
+    white:
+        Share of white in all colours.
+    """
+    brightness = _AMBIENT + (1.0 - _AMBIENT) * np.clip(normals @ (_LIGHT @ view.axes), 0.0, 1.0)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    pieces = np.concatenate([corners, values[..., None], brightness[..., None]], axis=2)[across @ view.axes[2] > 0.0]
+    for _ in range(_ROUNDS):
+        beyond = view.beyond(pieces[..., :3])
+        split = (beyond.min(axis=1) < 0.0) & (beyond.max(axis=1) > 0.0) | (len(pieces) < _FEW)
+        split |= np.ptp(pieces[..., 3], axis=1) > _SHADE * np.ptp(colors.get_clim())
+        coarse = pieces[split]
+        middles = 0.5 * (coarse + np.roll(coarse, -1, axis=1))
+        tips = [np.stack([coarse[:, i], middles[:, i], middles[:, i - 1]], axis=1) for i in range(3)]
+        pieces = np.concatenate([pieces[~split], middles, *tips])
+    beyond = view.beyond(pieces[..., :3])
+    shown = beyond.min(axis=1) < 0.0
+    pieces, beyond = pieces[shown], beyond[shown]
+    # The pieces that the cut goes through are small enough to be flattened onto it.
+    pieces[..., :3] -= np.maximum(beyond, 0.0)[..., None] * np.array(view.away)
+    flat = pieces.mean(axis=1)
+    return Painted(pieces[..., :3], (white + (1.0 - white) * colors.to_rgba(flat[:, 3])[:, :3]) * flat[:, 4:])
+
+
+def strokes(view: View, lines: Values, rgb: Values, width_mm: float, lift_mm: float) -> Painted:
+    """Straight lines, shape (lines, 2, 3), in colours of shape (lines, 3), as bands that face the eye.
+
+    They are lifted towards the eye, which in parallel projection is not seen but puts them before what they lie on.
+    """
+    right, upward, toward = view.axes
+    # Only short pieces are sorted well by the depths of their centres, and end close to the cut.
+    ends = lines[:, :1] + np.linspace(0.0, 1.0, _PARTS + 1)[:, None] * (lines[:, 1:] - lines[:, :1])
+    lines, rgb = np.stack([ends[:, :-1], ends[:, 1:]], axis=2).reshape(-1, 2, 3), np.repeat(rgb, _PARTS, axis=0)
+    shown = view.beyond(lines.mean(axis=1)) <= 1e-6
+    lines, rgb = lines[shown], rgb[shown]
+    along = lines[:, 1] - lines[:, 0]
+    across = np.outer(along @ right, upward) - np.outer(along @ upward, right)
+    across *= 0.5 * width_mm / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+    start, end = (lines + lift_mm * toward).transpose(1, 0, 2)
+    first = np.stack([start - across, start + across, end + across], axis=1)
+    second = np.stack([start - across, end + across, end - across], axis=1)
+    return Painted(np.concatenate([first, second]), np.concatenate([rgb, rgb]))
+
+
+def pen(view: View, lines: Values, size_mm: float) -> Painted:
+    """Lines of shape (lines, 2, 3) in mm that mark the edges of a body of the given size."""
+    return strokes(view, lines, np.full((len(lines), 3), 0.2), size_mm / 330, size_mm / 50)
+
+
+def show(axis: Any, view: View, layers: Sequence[Sequence[Painted]], middle: Values, half_mm: float) -> None:
+    """Draw on 3-D axes that reach `half_mm` from `middle` to each side; later layers cover earlier ones."""
+    axis.computed_zorder = False
+    for zorder, layer in enumerate(layers):
+        corners, rgb = (np.concatenate(parts) for parts in zip(*layer, strict=True))
+        # Without edges in their own colour, the background shines through between the pieces.
+        axis.add_collection3d(Poly3DCollection(corners, facecolors=rgb, edgecolors=rgb, linewidths=0.4, zorder=zorder))
+    low, high = middle - half_mm, middle + half_mm
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axis.set_proj_type("ortho")
+    axis.view_init(view.elevation_deg, view.azimuth_deg)
+    axis.set_box_aspect((1.0, 1.0, 1.0), zoom=_ZOOM)
+    axis.set_axis_off()
+
+
+def add_scale_bar(axis: Any, view: View, middle: Values, half_mm: float) -> None:
+    """A bar of a round length in the lower left of the picture."""
+    right, upward, _ = view.axes
+    length = max((bar for bar in _BARS_MM if bar <= half_mm / 3.0), default=_BARS_MM[0])
+    start = middle - 0.95 * half_mm * right - 0.85 * half_mm * upward
+    axis.plot(*np.array([start, start + length * right]).T, color="black", linewidth=2.0, zorder=9)
+    axis.text(*(start + 0.5 * length * right - 0.03 * half_mm * upward), f"{length:g} mm", ha="center", va="top")

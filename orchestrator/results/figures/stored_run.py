@@ -1,0 +1,85 @@
+"""Read back what a run left in its results folder: fields.h5 and timeseries.csv."""
+
+import csv
+from functools import cached_property
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ...participants.native import Mesh
+from ...participants.participant import Values
+
+
+class StoredRun:
+    """The results in `folder`; whatever is missing there reads as empty or None, never as an error.
+
+    Attributes
+    ----------
+    mesh:
+        The undeformed tetrahedra, without named boundaries; None without fields.h5 and for scenes of other elements.
+    frames_ms:
+        Times of the stored frames, shape (frames,).
+    columns:
+        The time series by column name, each of shape (rows,); an empty cell is NaN.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._fields = folder / "fields.h5"
+        self._series = folder / "timeseries.csv"
+
+    @cached_property
+    def mesh(self) -> Mesh | None:
+        """See the class."""
+        points, cells = self._read("points_mm"), self._read("cells")
+        # The figures in space are of solids.
+        if points is None or cells is None or cells.shape[1] != 4:
+            return None
+        return Mesh(points, cells.astype(np.int64))
+
+    @cached_property
+    def frames_ms(self) -> Values:
+        """See the class."""
+        times = self._read("frames_ms")
+        return np.empty(0) if times is None else times
+
+    @cached_property
+    def columns(self) -> dict[str, Values]:
+        """See the class."""
+        if not self._series.exists():
+            return {}
+        with self._series.open(newline="", encoding="utf-8") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+        # A run that was killed may leave half a row at the end.
+        complete = [[float(cell) if cell else np.nan for cell in row] for row in rows if len(row) == len(header)]
+        table = np.array(complete).reshape(len(complete), len(header))
+        return {name: table[:, place] for place, name in enumerate(header)}
+
+    @property
+    def end_ms(self) -> float:
+        """Time of the last accepted step, or of the last frame where there is no time series; −inf for neither."""
+        return float(max([*self.columns.get("time_ms", ()), *self.frames_ms], default=-np.inf))
+
+    def initial(self, name: str) -> Values | None:
+        """A fixed field, or the first frame of one that changes; None if there is none of that name."""
+        fixed = self._read(name)
+        return self.frame(name, 0) if fixed is None else fixed
+
+    def frame(self, name: str, number: int) -> Values | None:
+        """A changing field in a frame, shape (nodes or elements, ...); None if there is none."""
+        return self._read(f"frames/{name}", number)
+
+    def _read(self, name: str, row: int | None = None) -> Values | None:
+        """A data set or one row of it. Where units share a name, `unit.name` of the first unit is read."""
+        if not self._fields.exists():
+            return None
+        with h5py.File(self._fields, "r") as file:
+            group, _, last = name.rpartition("/")
+            if group not in ("", *file):
+                return None
+            within = file[group] if group else file
+            found = [key for key in within if key == last or key.endswith(f".{last}")]
+            if not found or (row is not None and row >= len(within[found[0]])):
+                return None
+            values = within[found[0]]
+            return np.asarray(values[:] if row is None else values[row])

@@ -1,0 +1,84 @@
+"""summary.json: the run in a few numbers, and the scenario it came from."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from math import isnan
+from pathlib import Path
+from platform import python_version
+from typing import Any
+
+from ..scenario import Scenario
+from .time_series import TimeSeries
+
+#: Potential in mV whose upward crossing at a probe is its activation.
+ACTIVATION_MV = -20.0
+
+_PACKAGES = ("cardiac-cosim", "fmpy", "pythonfmu", "scikit-fem", "scipy", "numpy", "meshio", "h5py")
+
+
+def write_summary(
+    path: Path,
+    scenario: Scenario,
+    series: TimeSeries,
+    seconds: Mapping[str, Any],
+    outcome: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Write the summary of a finished or failed run and return it.
+
+    `seconds` has the keys `total`, `master`, `units` (by name) and whatever else was timed; `outcome` has `status`.
+    """
+    time = series.column("time_ms")
+
+    def known(column: str) -> list[tuple[float, float]]:
+        # Units that step less often leave empty cells.
+        return [pair for pair in zip(time, series.column(column), strict=True) if not isnan(pair[1])]
+
+    content: dict[str, Any] = {
+        **outcome,
+        "name": scenario.name,
+        "end_ms": time[-1] if time else None,
+        "steps": max(len(time) - 1, 0),
+        "activation_time_ms": {
+            probe: crossing_time(*_columns(known(f"potential_{probe}_mV")), ACTIVATION_MV)
+            for probe in scenario.output.probes_mm
+            if f"potential_{probe}_mV" in series.columns
+        },
+    }
+    ejected = {}
+    for column in series.columns[1:]:
+        _, values = _columns(known(column))
+        # An output of a foreign FMU may have the name of one of the summary's own keys, which wins.
+        if values and not column.startswith("potential_") and column not in content:
+            content[column] = {"start": values[0], "min": min(values), "max": max(values), "end": values[-1]}
+            if column.endswith("_volume_ml") and values[0] > 0.0:
+                ejected[column.removesuffix("_volume_ml")] = (values[0] - min(values)) / values[0]
+    content["ejection_fraction"] = ejected
+    content["wall_s"] = dict(seconds)
+    content["master_overhead"] = seconds["master"] / seconds["total"] if seconds["total"] else None
+    content["versions"] = {"python": python_version(), **{name: version(name) for name in _PACKAGES}}
+    content["scenario"] = scenario.resolved()
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    os.replace(part, path)
+    return content
+
+
+def _columns(pairs: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
+    return [time for time, _ in pairs], [value for _, value in pairs]
+
+
+def crossing_time(time: Sequence[float], values: Sequence[float], threshold: float) -> float | None:
+    """First upward crossing of `threshold`, linear between the samples; None if there is none.
+
+    Values that start at or above the threshold cross it at the first time.
+    """
+    if values and values[0] >= threshold:
+        return time[0]
+    for (early, low), (late, high) in zip(
+        zip(time, values, strict=True), zip(time[1:], values[1:], strict=True), strict=False
+    ):
+        if low < threshold <= high:
+            return early + (late - early) * (threshold - low) / (high - low)
+    return None

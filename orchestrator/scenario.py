@@ -1,0 +1,402 @@
+"""A scenario: what a person asks for in a YAML file, validated whole before anything runs."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.reader import ReaderError
+
+from .errors import InputError, did_you_mean
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# A kilometre in mm is far outside of any anatomy, and near enough to be computed with.
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+
+#: How far a time may be from a whole number of steps and still be taken for rounding in the YAML file.
+_WHOLE = 1e-9
+
+#: Characters of a wrong value that a message repeats.
+_LONGEST = 80
+
+#: More communication steps than any run can take are a slip of the pen.
+_MOST_STEPS = 10_000_000
+
+#: What a name has to look like, and how to say that to a person.
+_NAME = r"^\w[\w.-]*$"
+_UNIT_NAME = r"^[A-Za-z]\w*$"
+_PROBE_NAME = r"^\w+$"
+_WORKERS = r"^(threads|processes|(tcp|tls|ws|wss|ucx)://\S+)$"
+_ALLOWED = {
+    _WORKERS: "choose threads, processes, or the address of a Dask scheduler, tcp://host:port",
+    _NAME: "begin with a letter or digit, then letters, digits, '_', '-' and '.'",
+    _UNIT_NAME: "begin with a letter, then letters, digits and '_'",
+    _PROBE_NAME: "use letters, digits and '_'",
+}
+
+#: The remedies for what people stumble over in YAML, by what the parser complains of.
+_YAML_REMEDIES = {
+    "'\\t'": "indent with spaces, not with tabs",
+    "duplicate key": "keep one of the two",
+    "mapping values are not allowed": "check the indentation, and that a space follows every colon",
+    "could not find expected ':'": "write `key: value`, and check the indentation",
+    "expected ',' or": "close the bracket or brace, and separate its items by commas",
+    "<block end>": "check the indentation",
+    "cannot start any token": "put the text in quotes",
+    "undefined alias": "put the text in quotes",
+    "another document": "a scenario is one document; remove the line ---",
+    "end of stream": "a quote is not closed",
+    "constructor for the tag": "put the text in quotes",
+}
+
+
+def _scalar(value: Any) -> Any:
+    if not isinstance(value, (bool, int, float, str)):
+        raise ValueError("expected a number, a text, true or false")
+    # Numbers beyond the range of floats, written out, are infinite too.
+    if isinstance(value, (int, float)) and not abs(value) <= sys.float_info.max:
+        raise ValueError("expected a finite number")
+    return value
+
+
+Scalar = Annotated[Any, AfterValidator(_scalar)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Scene(_Section):
+    """The anatomy: a named geometry at a mesh size, or a mesh file."""
+
+    geometry: str | None = None
+    mesh: str | None = None
+    mesh_size_mm: Positive = 5.0
+
+    @model_validator(mode="after")
+    def _one_of(self) -> "Scene":
+        if (self.geometry is None) == (self.mesh is None):
+            raise ValueError("give either `geometry` (with `mesh_size_mm`) or `mesh`, a mesh file")
+        if self.mesh is not None and "mesh_size_mm" in self.model_fields_set:
+            raise ValueError("`mesh_size_mm` has no meaning with `mesh`; remove it")
+        return self
+
+
+class UnitEntry(_Section):
+    """One participant: a unit of this project by name, or any FMI 2.0 co-simulation FMU by path.
+
+    `start` gives start values to variables of an FMU; `every` steps the unit at every so-many-th exchange only.
+    """
+
+    unit: str | None = None
+    fmu: str | None = None
+    parameters: dict[str, Scalar] = Field(default_factory=dict)
+    start: dict[str, Scalar] = Field(default_factory=dict)
+    every: Annotated[int, Field(ge=1)] = 1
+
+    @model_validator(mode="after")
+    def _one_of(self) -> "UnitEntry":
+        if (self.unit is None) == (self.fmu is None):
+            raise ValueError("give either `unit`, the name of a unit, or `fmu`, the path of an FMU")
+        if self.start and self.fmu is None:
+            raise ValueError("`start` is for the variables of an FMU; a unit starts from its `parameters`")
+        return self
+
+
+class CriterionEntry(_Section):
+    """When a field counts as converged; of several measures any one is enough."""
+
+    absolute: Positive | None = None
+    relative: Positive | None = None
+    residual_relative: Annotated[Positive | None, Field(alias="residual-relative")] = None
+
+    @model_validator(mode="after")
+    def _one(self) -> "CriterionEntry":
+        if self.absolute is None and self.relative is None and self.residual_relative is None:
+            raise ValueError("give a limit: `relative`, `absolute` or `residual-relative`")
+        return self
+
+
+class Iterate(_Section):
+    """Sweeps to convergence."""
+
+    max_iterations: Annotated[int, Field(ge=1)] = 20
+    acceleration: Literal["none", "relaxation", "aitken", "anderson"] = "none"
+    relaxation: Annotated[float | None, Field(gt=0, le=2)] = None
+    converge: Annotated[dict[str, CriterionEntry], Field(min_length=1)]
+    on_limit: Literal["error", "warn"] = "error"
+
+
+class Adaptive(_Section):
+    """Communication steps by an error estimate; `tolerance` is relative to the fields' magnitudes."""
+
+    tolerance: Positive = 0.1
+    min_ms: Positive = 0.5
+    max_ms: Positive = 20.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Adaptive":
+        if self.min_ms > self.max_ms:
+            raise ValueError(f"`min_ms` ({self.min_ms:g}) is above `max_ms` ({self.max_ms:g}); change one of them")
+        return self
+
+
+class Coupling(_Section):
+    """The scheme by which the units exchange their fields, and how inputs behave between exchanges.
+
+    With `adaptive`, `step_ms` is the first step, and inputs are ramped and extrapolated to first order unless told
+    otherwise: with held ones no step is long and accurate.
+    """
+
+    scheme: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
+    order: list[str] | None = None
+    step_ms: Positive = 1.0
+    adaptive: Adaptive | None = None
+    iterate: Iterate | None = None
+    interpolation: Literal["hold", "linear"] = "hold"
+    extrapolation: Literal[0, 1, 2] = 0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _second_order(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("adaptive") is not None:
+            return {"interpolation": "linear", "extrapolation": 1} | given
+        return given
+
+
+class Run(_Section):
+    """How long, by FMUs or by direct calls, where the units work, and what guards a long run.
+
+    `workers` names where units step at the same time: `threads`, `processes`, or the address of a Dask scheduler.
+    `checkpoint_every` counts accepted steps; 0 writes no checkpoints. `unit_time_limit_s` bounds a unit's step.
+    """
+
+    stop_ms: Positive = 320.0
+    participants: Literal["fmu", "native"] = "fmu"
+    workers: Annotated[str | None, Field(pattern=_WORKERS)] = None
+    unit_time_limit_s: Positive | None = None
+    checkpoint_every: Annotated[int, Field(ge=0)] = 20
+
+    @model_validator(mode="after")
+    def _limited(self) -> "Run":
+        if self.unit_time_limit_s is not None and self.workers in (None, "threads"):
+            raise ValueError("`unit_time_limit_s` needs units in processes of their own; add `workers: processes`")
+        return self
+
+
+class Output(_Section):
+    """What is kept, and how often."""
+
+    every_ms: Positive = 5.0
+    probes_mm: dict[Annotated[str, Field(pattern=_PROBE_NAME)], Point] = Field(default_factory=dict)
+
+
+class Scenario(_Section):
+    """A whole scenario."""
+
+    name: Annotated[str, Field(pattern=_NAME)]
+    scene: Scene | None = None
+    units: Annotated[dict[Annotated[str, Field(pattern=_UNIT_NAME)], UnitEntry], Field(min_length=1)]
+    connections: list[str] = Field(default_factory=list)
+    coupling: Coupling = Coupling()
+    run: Run = Run()
+    output: Output = Output()
+
+    @model_validator(mode="after")
+    def _anatomy(self) -> "Scenario":
+        own = [name for name, entry in self.units.items() if entry.unit is not None]
+        if self.scene is None and own:
+            raise ValueError(f"the key 'scene' is missing; unit '{own[0]}' needs a mesh")
+        if self.scene is None and self.output.probes_mm:
+            raise ValueError("`output.probes_mm` needs a `scene`, whose mesh the points lie in; remove it")
+        return self
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> "Scenario":
+        adaptive = self.coupling.adaptive
+        if adaptive is not None:
+            steps = self.run.stop_ms / self.output.every_ms
+            self._check_count("run.stop_ms", self.run.stop_ms, self.run.stop_ms / adaptive.min_ms, "adaptive.min_ms")
+            if not _is_whole(steps):
+                raise ValueError(
+                    f"`run.stop_ms` ({self.run.stop_ms:g} ms) is no whole number of `output.every_ms` "
+                    f"({self.output.every_ms:g} ms), which `coupling.adaptive` needs; change one of them"
+                )
+            return self
+        step = self.coupling.step_ms
+        for key, time in (("run.stop_ms", self.run.stop_ms), ("output.every_ms", self.output.every_ms)):
+            self._check_count(key, time, time / step, "step_ms")
+            if not _is_whole(time / step):
+                raise ValueError(
+                    f"`{key}` ({time:g} ms) is no whole number of steps of `coupling.step_ms` "
+                    f"({step:g} ms); change one of them"
+                )
+        return self
+
+    @staticmethod
+    def _check_count(key: str, time: float, steps: float, step: str) -> None:
+        if steps > _MOST_STEPS:
+            raise ValueError(
+                f"`{key}` ({time:g} ms) is {steps:.3g} steps of `coupling.{step}` ({time / steps:g} ms), "
+                f"more than {_MOST_STEPS:.0e} are refused; change one of them"
+            )
+
+    def resolved(self) -> dict[str, Any]:
+        """The scenario with every default written out; it can be loaded again."""
+        without: dict[str, set[str]] = {}
+        if self.scene is not None and self.scene.mesh is not None:
+            without["scene"] = {"mesh_size_mm"}
+        content = self.model_dump(exclude=without or None, by_alias=True)
+        if self.scene is None:
+            del content["scene"]
+        return content
+
+
+def _is_whole(steps: float) -> bool:
+    return round(steps) >= 1 and abs(steps - round(steps)) <= _WHOLE * steps
+
+
+def load_scenario(path: Path, assignments: Sequence[str] = ()) -> Scenario:
+    """Read `path` and apply `assignments` (each `key.path=value`); InputError names the key and the remedy."""
+    content = _read(path)
+    if content is None:
+        raise InputError(f"{path}: the file is empty; a scenario needs at least `name`, `scene` and `units`")
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: a scenario is lines `key: value` with the keys {', '.join(Scenario.model_fields)}")
+    for assignment in assignments:
+        _assign(content, assignment)
+    try:
+        return Scenario.model_validate(content)
+    except ValidationError as error:
+        problems = [_explain(problem) for problem in error.errors()]
+        origin = f"{path} with {', '.join(f'--set {text}' for text in assignments)}" if assignments else str(path)
+        raise InputError(f"{origin}: " + f"\n{origin}: ".join(dict.fromkeys(problems))) from None
+
+
+def _read(path: Path) -> Any:
+    try:
+        return _yaml(path.read_bytes())
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such scenario file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: this is a folder; give the scenario's YAML file") from None
+    except OSError as error:
+        raise InputError(f"{path}: the scenario file cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _yaml(text: bytes | str) -> Any:
+    """The content of `text`; ValueError says what is no YAML, where, and what to do about it."""
+    try:
+        return YAML(typ="safe", pure=True).load(text)
+    except ReaderError as error:
+        raise ValueError(f"not a text file (position {error.position}); save it as plain text in UTF-8") from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = "" if mark is None else f" in line {mark.line + 1}"
+        problem = " ".join(str(error.problem or error.context).split())
+        if "duplicate key" in problem:
+            problem = problem.partition(" with value")[0]
+        remedy = next((f"; {remedy}" for sign, remedy in _YAML_REMEDIES.items() if sign in problem), "")
+        raise ValueError(f"not valid YAML{line}: {problem}{remedy}") from None
+    except RecursionError:
+        raise ValueError("not valid YAML: nested too deeply") from None
+    # A value that does not fit its tag, or a date that does not exist, ends in whatever the constructor trips over.
+    except Exception as error:
+        raise ValueError(f"not valid YAML: {error}; put the text in quotes") from None
+
+
+def _assign(content: dict[str, Any], assignment: str) -> None:
+    key, separator, text = assignment.partition("=")
+    *parents, last = [part.strip() for part in key.split(".")]
+    if not separator or not all((*parents, last)):
+        raise InputError(f"--set {assignment}: write it as key.path=value, e.g. --set run.stop_ms=100")
+    try:
+        value = _yaml(text)
+    except ValueError as error:
+        raise InputError(f"--set {assignment}: the value is {error}") from None
+    target = content
+    for parent in parents:
+        section = target.get(parent)
+        if not isinstance(section, dict | None):
+            raise InputError(
+                f"--set {assignment}: '{parent}' holds {_short(section)}, not a section; set it as a whole, "
+                f"--set {key.partition(parent)[0]}{parent}=..."
+            )
+        # A copy: in YAML two sections can be one and the same, by an alias.
+        target[parent] = dict(section or {})
+        target = target[parent]
+    target[last] = value
+
+
+def _explain(problem: Mapping[str, Any]) -> str:
+    location, kind, given = [str(part) for part in problem["loc"] if part != "[key]"], problem["type"], problem["input"]
+    key, is_key = ".".join(location), "[key]" in problem["loc"]
+    context = problem.get("ctx", {})
+    if kind == "extra_forbidden":
+        return f"unknown key '{key}'{did_you_mean(location[-1], _keys_at(location[:-1]))}"
+    if kind == "missing":
+        return f"the key '{key}' is missing"
+    if kind == "value_error":
+        return f"'{key}': {context['error']}" if key else str(context["error"])
+    if kind == "invalid_key" or (is_key and kind == "string_type"):
+        return (
+            f"'{key}': a key has to be text, not {_short(given)}; put it in quotes "
+            "(or, if it is the rest of a number, write that with a point: 0.5)"
+        )
+    if kind == "string_pattern_mismatch":
+        what = "choice" if context["pattern"] == _WORKERS else "name"
+        return f"'{key}': {_short(given)} is no valid {what}; {_ALLOWED[context['pattern']]}"
+    if kind == "literal_error":
+        return f"'{key}' is {_short(given)}: it should be {context['expected']}{_nearest(given, context['expected'])}"
+    return f"'{key}' is {_short(given)}: {_expected(kind, given, problem)}"
+
+
+def _expected(kind: str, given: Any, problem: Mapping[str, Any]) -> str:
+    """What should be there instead of `given`, and what to do about it."""
+    if kind in ("model_type", "dict_type", "model_attributes_type", "too_short") and not given:
+        return "the section has no content; fill it or remove the key"
+    if kind in ("model_type", "dict_type", "model_attributes_type"):
+        return "expected a section, lines `key: value` or {key: value, ...}"
+    if problem["loc"][:2] == ("output", "probes_mm") and kind in ("list_type", "too_short", "too_long"):
+        return "expected the three coordinates of a point in mm, [x, y, z]"
+    if kind == "list_type":
+        return "expected a list, lines `- item` or [item, item]"
+    if kind == "string_type":
+        return "expected a text" + ("" if given is None else "; put it in quotes")
+    if kind in ("float_type", "int_type", "float_parsing"):
+        unit = "; its unit of measure is the one the key's name ends in" if isinstance(given, str) else ""
+        return f"expected a number, written alone and without quotes{unit}"
+    if kind == "none_required":
+        return "only null is possible yet; remove the key"
+    message: str = problem["msg"]
+    return message.replace("Input should be", "it should be")
+
+
+def _nearest(given: Any, expected: str) -> str:
+    names = [name.strip("' ") for name in expected.replace(" or ", ",").split(",")]
+    hint = did_you_mean(str(given), names) if isinstance(given, str) else ""
+    return hint if hint.startswith(";") and len(names) > 1 else ""
+
+
+def _short(given: Any) -> str:
+    if given is None:
+        return "empty"
+    text = repr(given)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def _keys_at(location: Sequence[str]) -> list[str]:
+    """The keys that the section at `location` may have."""
+    sections: dict[str, type[BaseModel]] = {"scene": Scene, "coupling": Coupling, "run": Run, "output": Output}
+    section = UnitEntry if location[:1] == ["units"] else sections.get(location[0], Scenario) if location else Scenario
+    if location[:2] == ["coupling", "adaptive"]:
+        section = Adaptive
+    if location[:2] == ["coupling", "iterate"]:
+        section = CriterionEntry if location[2:3] == ["converge"] else Iterate
+    return [field.alias or name for name, field in section.model_fields.items()]

@@ -1,0 +1,139 @@
+"""`cosim show`: what a scenario builds, exchanges and solves, before anything runs; and what it does without."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import ceil
+
+import networkx as nx
+import numpy as np
+
+from .coupling.build import idle
+from .coupling.connections import Connection
+from .coupling.master import stepping_order
+from .participants.native import Mesh, element_quality
+from .participants.participant import Participant
+from .scenario import Scenario
+
+#: 10–90 % width of a depolarising front in mm (model.md, Numbers); an element longer than half of it is too coarse.
+_FRONT_MM = 7.9
+#: How long an upstroke takes in ms on the way from rest to its peak.
+_UPSTROKE_MS = 15.0
+
+_ELEMENTS = {0: "points", 1: "lines", 2: "triangles", 3: "tetrahedra"}
+
+
+def describe(
+    scenario: Scenario,
+    mesh: Mesh | None,
+    participants: Mapping[str, Participant],
+    connections: Sequence[Connection],
+) -> str:
+    """The text for a person: mesh, units, connections, loops, order, exchange, what is not modelled, warnings."""
+    order = stepping_order(participants, scenario.coupling.order)
+    parts = {
+        "mesh": [] if mesh is None else list(_mesh(mesh)),
+        "units": list(_units(scenario, participants)),
+        "connections": [str(link) + _fixed(link, participants) for link in connections] or ["none"],
+        "loops": _loops(order, connections) or ["none: one ordered sweep is exact, there is nothing to iterate"],
+        "order": [" -> ".join(order)],
+        "exchange": list(_exchange(scenario, participants, connections, order)),
+        "not modelled": list(_absent(participants, connections)) or ["nothing is left out"],
+        "warnings": list(_warnings(scenario, mesh)) or ["none"],
+    }
+    lines = [scenario.name]
+    for title, content in parts.items():
+        lines += [f"\n{title}", *(f"  {line}" for line in content)] if content else []
+    return "\n".join(lines)
+
+
+def _mesh(mesh: Mesh) -> Iterator[str]:
+    yield f"{mesh.nodes} nodes, {mesh.elements} {_ELEMENTS[mesh.dimension]}"
+    if mesh.dimension == 3:
+        quality = element_quality(mesh)
+        yield f"volume {mesh.volumes.sum() / 1000.0:.2f} ml, SICN {quality.min():.2f} to {quality.max():.2f}"
+    if mesh.dimension:
+        edges = _edges(mesh)
+        yield f"edges {edges.min():.2f} to {edges.max():.2f} mm, mean {edges.mean():.2f} mm"
+    for name, faces in mesh.boundaries.items():
+        yield f"boundary {name}: {len(faces)} faces"
+
+
+def _units(scenario: Scenario, participants: Mapping[str, Participant]) -> Iterator[str]:
+    for name, participant in participants.items():
+        entry = scenario.units[name]
+        yield f"{name}: {entry.unit or entry.fmu}"
+        for title, ports in (("in ", participant.inputs), ("out", participant.outputs)):
+            for port in ports.values():
+                shape = " × ".join(map(str, port.shape)) or "scalar"
+                unit = "" if port.unit in (None, "1") else f" {port.unit}"
+                yield f"  {title} {port.name}{unit}, {shape}{' (once)' if port.fixed else ''}"
+
+
+def _loops(order: Sequence[str], connections: Sequence[Connection]) -> list[str]:
+    graph = nx.DiGraph()
+    graph.add_nodes_from(order)
+    graph.add_edges_from(
+        (link.source.unit, link.target.unit)
+        for link in connections
+        if link.source.unit in order and link.target.unit in order
+    )
+    found = [members for members in nx.strongly_connected_components(graph) if len(members) > 1]
+    return [" <-> ".join(sorted(members, key=order.index)) for members in found]
+
+
+def _exchange(
+    scenario: Scenario,
+    participants: Mapping[str, Participant],
+    connections: Sequence[Connection],
+    order: Sequence[str],
+) -> Iterator[str]:
+    moving = [link for link in connections if not _fixed(link, participants)]
+    numbers = sum(participants[link.source.unit].outputs[link.source.name].size for link in moving)
+    yield f"{numbers} numbers in {len(moving)} fields at every exchange"
+    outputs = ceil(scenario.run.stop_ms / scenario.output.every_ms - 1e-9)
+    lazy = idle(participants, connections)
+    if scenario.coupling.adaptive is not None:
+        yield f"steps of {scenario.coupling.adaptive.min_ms:g} to {scenario.coupling.adaptive.max_ms:g} ms, as needed"
+        return
+    steps = round(scenario.run.stop_ms / scenario.coupling.step_ms)
+    for unit in order:
+        every = scenario.units[unit].every
+        count = outputs if unit in lazy else max(ceil(steps / every), 1)
+        saved = "" if count >= steps else f", {steps - count} fewer than exchanges"
+        why = "; nothing is fed by it between outputs" if unit in lazy and count < steps else ""
+        yield f"{unit}: {count} solves{saved}{why}"
+
+
+def _absent(participants: Mapping[str, Participant], connections: Sequence[Connection]) -> Iterator[str]:
+    fed = {(link.target.unit, link.target.name) for link in connections}
+    for name, participant in participants.items():
+        for port in participant.inputs.values():
+            if not port.live:
+                yield f"{name}.{port.name}: {port.needs} of the unit is 0, so it has no influence and is not connected"
+            elif (name, port.name) not in fed:
+                yield f"{name}.{port.name}: no unit gives it, so it keeps its start value"
+
+
+def _warnings(scenario: Scenario, mesh: Mesh | None) -> Iterator[str]:
+    if mesh is not None and mesh.dimension:
+        longest = float(_edges(mesh).mean())
+        if longest > _FRONT_MM / 2.0:
+            yield (
+                f"elements of {longest:.1f} mm are coarse against a depolarising front of {_FRONT_MM:g} mm: "
+                "waves are too fast (consistent mass) or too slow (lumped); compare with a finer mesh_size_mm"
+            )
+    coupling = scenario.coupling
+    if coupling.adaptive is None and coupling.step_ms > _UPSTROKE_MS:
+        yield f"coupling.step_ms of {coupling.step_ms:g} ms is longer than an upstroke of {_UPSTROKE_MS:g} ms"
+
+
+def _edges(mesh: Mesh) -> np.ndarray:
+    corners = mesh.points[mesh.cells]
+    count = mesh.dimension + 1
+    pairs = [(one, other) for one in range(count) for other in range(one)]
+    return np.concatenate([np.linalg.norm(corners[:, one] - corners[:, other], axis=1) for one, other in pairs])
+
+
+def _fixed(link: Connection, participants: Mapping[str, Participant]) -> str:
+    source = participants[link.source.unit].outputs[link.source.name]
+    target = participants[link.target.unit].inputs[link.target.name]
+    return " (once)" if source.fixed or target.fixed else ""

@@ -1,0 +1,160 @@
+"""Participants of one line of arithmetic, the command called in this process, and where tests build their FMUs."""
+
+import pickle
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cardiac_cosim.orchestrator.cli import main
+from cardiac_cosim.orchestrator.coupling.connections import connect
+from cardiac_cosim.orchestrator.coupling.master import Master
+from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
+from cardiac_cosim.orchestrator.coupling.timeline import Timeline
+from cardiac_cosim.orchestrator.errors import ParticipantError
+from cardiac_cosim.orchestrator.participants.participant import Abilities, Port, Ramp, Values, Wait
+
+#: From the inputs, the outputs, begin and size of a step in s to the outputs at its end.
+Law = Callable[..., Mapping[str, Any]]
+
+
+def scalar(name: str, **rest: Any) -> Port:
+    """A port of one number."""
+    return Port(name, rest.pop("unit", "1"), rest.pop("shape", ()), record=rest.pop("record", "value"), **rest)
+
+
+@dataclass
+class Fake:
+    """A participant that keeps a diary of all calls in `calls`."""
+
+    name: str
+    inputs: Any = ()
+    outputs: Any = ()
+    law: Law = lambda inputs, outputs, time, size: outputs
+    begins: Mapping[str, Any] = field(default_factory=dict)
+    calls: list[tuple[Any, ...]] = field(default_factory=list)
+    #: The law gets the inputs at the step's begin as well.
+    ramps: bool = False
+
+    def __post_init__(self) -> None:
+        self.inputs = {port.name: port for port in self.inputs}
+        self.outputs = {port.name: port for port in self.outputs}
+        self._in: dict[str, Values] = {name: np.zeros(port.shape) for name, port in self.inputs.items()}
+        self._out: dict[str, Values] = {name: np.zeros(port.shape) for name, port in self.outputs.items()}
+        self._ramps: dict[str, Ramp] = {}
+        self._take(self.begins)
+
+    def _take(self, values: Mapping[str, Any]) -> None:
+        for name, value in values.items():
+            self._out[name] = np.broadcast_to(np.asarray(value, float), self.outputs[name].shape)
+
+    def begin(self) -> None:
+        self.calls.append((self.name, "begin"))
+
+    def complete(self) -> None:
+        self.calls.append((self.name, "complete"))
+
+    def set(self, name: str, values: Values) -> None:
+        if values.shape != self.inputs[name].shape:
+            raise ParticipantError(f"{name} got the shape {values.shape}")
+        self.calls.append((self.name, "set", name, values.tolist()))
+        self._in[name] = values
+
+    def get(self, name: str) -> Values:
+        return self._out[name].copy()
+
+    def ramp(self, name: str, ramp: Ramp) -> None:
+        self.calls.append((self.name, "ramp", name, ramp.begin.tolist(), ramp.end.tolist()))
+        self._ramps[name] = ramp
+        self._in[name] = ramp.end
+
+    def start(self, time: float, size: float) -> Wait:
+        self.calls.append((self.name, "step", time, size))
+        ramps, self._ramps = self._ramps, {}
+        begins = [self._in | {name: ramp.begin for name, ramp in ramps.items()}] if self.ramps else []
+        self._take(self.law(self._in, self._out, time, size, *begins))
+        return lambda: None
+
+    @property
+    def abilities(self) -> Abilities:
+        return Abilities(ramps=self.ramps)
+
+    def save(self) -> Any:
+        self.calls.append((self.name, "save"))
+        return dict(self._in), dict(self._out)
+
+    def restore(self, state: Any) -> None:
+        self.calls.append((self.name, "restore"))
+        self._in, self._out = dict(state[0]), dict(state[1])
+
+    def free(self, state: Any) -> None:
+        self.calls.append((self.name, "free"))
+
+    def pack(self) -> bytes:
+        return pickle.dumps((self._in, self._out))
+
+    def unpack(self, data: bytes) -> None:
+        self._in, self._out = pickle.loads(data)
+
+    def close(self) -> None:
+        self.calls.append((self.name, "close"))
+
+
+@pytest.fixture(scope="session")
+def fake() -> type[Fake]:
+    return Fake
+
+
+def couple(units: Mapping[str, Any], steps: int = 1, written: Sequence[str] = (), **rest: Any) -> Master:
+    """A master of `units` for so many steps; `rest` are its other parameters."""
+    scheme, step_ms = rest.pop("scheme", "gauss-seidel"), rest.pop("step_ms", 1.0)
+    connections = connect(units, written)
+    scheme = SCHEMES[scheme]() if isinstance(scheme, str) else scheme
+    timeline = Timeline.of_fixed_step(step_ms, steps * step_ms, rest.pop("every_ms", step_ms))
+    return Master(units, connections, scheme, timeline, **rest)
+
+
+@pytest.fixture(scope="session")
+def master() -> Callable[..., Master]:
+    return couple
+
+
+@pytest.fixture(scope="session")
+def port() -> Callable[..., Port]:
+    return scalar
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a call of the command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def cosim(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
+    """The command, in this process and without figures. A traceback in a terminal is an exception here."""
+
+    def call(*arguments: object) -> Ended:
+        quick = ["--no-figures"] if arguments[0] == "run" else []
+        monkeypatch.setattr(sys, "argv", ["cosim", *map(str, arguments), *quick])
+        capsys.readouterr()
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        return Ended(code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def fmu_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the FMUs of a test session are built, once for all tests."""
+    return tmp_path_factory.mktemp("fmus")

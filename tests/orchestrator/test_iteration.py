@@ -1,0 +1,234 @@
+"""If this failed, iterated coupling would stop too early, never, or at values that are no solution of the loop."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from cardiac_cosim.orchestrator.coupling.acceleration import Acceleration, Aitken, Anderson, Relaxation
+from cardiac_cosim.orchestrator.coupling.connections import Connection, connect
+from cardiac_cosim.orchestrator.coupling.convergence import Convergence, Criterion
+from cardiac_cosim.orchestrator.coupling.iteration import Iterated, Limits
+from cardiac_cosim.orchestrator.coupling.master import Accepted, Master
+from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
+from cardiac_cosim.orchestrator.coupling.timeline import Timeline
+from cardiac_cosim.orchestrator.errors import RunError
+
+
+class _Watch:
+    def __init__(self) -> None:
+        self.steps: list[Accepted] = []
+
+    def accept(self, step: Accepted, exchange: Any) -> None:
+        self.steps.append(step)
+
+
+@pytest.fixture
+def loop(fake: Any, port: Any) -> Callable[..., dict[str, Any]]:
+    """Two units with y = G x + b and x = y, at once: an algebraic loop whose solution is (1 − G)⁻¹ b."""
+
+    def make(gain: Any, offset: Any = 1.0) -> dict[str, Any]:
+        matrix, constant = np.atleast_2d(gain).astype(float), np.atleast_1d(offset).astype(float)
+        x, y = port("x", shape=constant.shape), port("y", shape=constant.shape)
+        return {
+            "a": fake("a", [x], [y], law=lambda inputs, *_: {"y": matrix @ inputs["x"] + constant}),
+            "b": fake("b", [y], [x], law=lambda inputs, *_: {"x": inputs["y"]}),
+        }
+
+    return make
+
+
+def _run(
+    units: dict[str, Any],
+    scheme: str = "gauss-seidel",
+    acceleration: Acceleration | None = None,
+    steps: int = 1,
+    limit: int = 50,
+    tolerance: float = 1e-10,
+    fail: bool = True,
+) -> tuple[Master, list[Accepted]]:
+    connections: tuple[Connection, ...] = connect(units, [])
+    # Under Gauss–Seidel one value is carried from sweep to sweep, under Jacobi both are.
+    carried = ("b.x",) if scheme == "gauss-seidel" else ("a.y", "b.x")
+    criteria = {name: Criterion(absolute=tolerance) for name in carried}
+    limits = Limits(criteria, limit, fail)
+    iterated = Iterated(SCHEMES[scheme](), units, connections, acceleration or Relaxation(1.0), limits)
+    timeline = Timeline.of_fixed_step(1.0, float(steps), 1.0)
+    master, watch = Master(units, connections, iterated, timeline), _Watch()
+    master.run([watch])
+    return master, watch.steps
+
+
+@pytest.mark.parametrize("gain", [-0.9, -0.5, 0.3, 0.8])
+@pytest.mark.parametrize(("scheme", "power"), [("gauss-seidel", 1.0), ("jacobi", 0.5)])
+def test_a_scalar_loop_contracts_by_its_gain(loop: Any, gain: float, scheme: str, power: float) -> None:
+    master, (_, step) = _run(loop(gain), scheme, limit=500)
+    history = [sweep["b.x"] for sweep in step.sweeps.loops[0].history]
+    # Under Jacobi the two values take turns: the rate shows over two sweeps.
+    shrunk = [late / early for early, late in zip(history, history[2:], strict=False) if late > 1e-8]
+    assert len(shrunk) > 5
+    np.testing.assert_allclose(np.sqrt(shrunk), abs(gain) ** power, rtol=1e-6)
+    assert step.sweeps.contraction_rate == pytest.approx(abs(gain) ** power, rel=0.1)
+    assert master.exchange.value("b", "x") == pytest.approx(1.0 / (1.0 - gain), rel=1e-8)
+
+
+@pytest.mark.parametrize("gain", [-3.0, -0.5, 0.5])
+def test_relaxation_converges_up_to_its_limit_and_not_beyond(loop: Any, gain: float) -> None:
+    limit = 2.0 / (1.0 - gain)
+    master, (_, step) = _run(loop(gain), acceleration=Relaxation(0.9 * limit), limit=500)
+    assert master.exchange.value("b", "x") == pytest.approx(1.0 / (1.0 - gain), rel=1e-8)
+    with pytest.raises(RunError, match="no convergence in 200 sweeps"):
+        _run(loop(gain), acceleration=Relaxation(1.1 * limit), limit=200)
+    _, (_, best) = _run(loop(gain), acceleration=Relaxation(1.0 / (1.0 - gain)))
+    # At the best factor the second iterate is exact.
+    assert best.sweeps.iterations == 2
+    assert step.sweeps.iterations > 10
+
+
+@pytest.mark.parametrize("gain", [-3.0, -30.0, 1.5, 0.99])
+def test_aitken_needs_three_evaluations_of_a_scalar_loop(loop: Any, gain: float) -> None:
+    master, (_, step) = _run(loop(gain), acceleration=Aitken(0.5))
+    assert step.sweeps.iterations <= 3
+    assert master.exchange.value("b", "x") == pytest.approx(1.0 / (1.0 - gain), rel=1e-8)
+
+
+@pytest.mark.parametrize("scheme", ["gauss-seidel", "jacobi"])
+@pytest.mark.parametrize("gain", [-3.0, 1.5])
+def test_anderson_needs_a_handful_where_the_plain_iteration_diverges(loop: Any, gain: float, scheme: str) -> None:
+    with pytest.raises(RunError, match="the residual changes by a factor of"):
+        _run(loop(gain), scheme, limit=30)
+    master, (_, step) = _run(loop(gain), scheme, Anderson(0.1))
+    assert step.sweeps.iterations <= 6
+    assert master.exchange.value("b", "x") == pytest.approx(1.0 / (1.0 - gain), rel=1e-8)
+
+
+@pytest.mark.parametrize("size", [2, 3, 5])
+def test_anderson_solves_a_linear_loop_in_as_many_sweeps_as_it_has_unknowns(loop: Any, size: int) -> None:
+    random = np.random.default_rng(size)
+    gain, offset = random.normal(size=(size, size)), random.normal(size=size)
+    # As many differences as unknowns have to be seen, one sweep more is exact; the filter is not to lose any of them.
+    master, (_, step) = _run(loop(gain, offset), acceleration=Anderson(0.1, filter_limit=1e-12), tolerance=1e-9)
+    assert step.sweeps.iterations <= size + 3
+    expected = np.linalg.solve(np.eye(size) - gain, offset)
+    np.testing.assert_allclose(master.exchange.value("b", "x"), expected, rtol=1e-6)
+
+
+def test_columns_of_earlier_steps_save_sweeps(loop: Any) -> None:
+    random = np.random.default_rng(1)
+    gain, offset = 0.9 * random.normal(size=(6, 6)), random.normal(size=6)
+
+    def sweeps(reused: int) -> int:
+        units, time = loop(gain, offset), [0.0]
+
+        def moving(inputs: Any, outputs: Any, begin: float, size: float) -> dict[str, Any]:
+            time[0] = begin + size
+            return {"y": gain @ inputs["x"] + offset * np.cos(1e3 * time[0])}
+
+        units["a"].law = moving
+        _, steps = _run(units, acceleration=Anderson(0.1, reused_steps=reused, filter_limit=1e-8), steps=6)
+        return sum(step.sweeps.iterations for step in steps[2:])
+
+    assert sweeps(8) < sweeps(0)
+
+
+@pytest.mark.parametrize("acceleration", [Relaxation(1.0), Aitken(0.5), Anderson(0.1)])
+def test_a_loop_that_stands_still_takes_one_sweep_a_step(loop: Any, acceleration: Acceleration) -> None:
+    master, steps = _run(loop(0.0, 0.0), acceleration=acceleration, steps=3)
+    assert [step.sweeps.iterations for step in steps[1:]] == [1, 1, 1]
+    assert master.exchange.value("b", "x") == 0.0
+
+
+@pytest.mark.parametrize("acceleration", [Relaxation(1.0), Aitken(0.5), Anderson(0.1)])
+def test_accelerations_survive_residuals_of_zero(acceleration: Acceleration) -> None:
+    zero, one = np.zeros(3), np.ones(3)
+    acceleration.begin()
+    for residual in (one, one, zero, zero, one):
+        following = acceleration.next(one, residual)
+        assert np.isfinite(following).all()
+
+
+def test_convergence_is_what_the_criterion_says_and_not_the_count(loop: Any) -> None:
+    _, (_, step) = _run(loop(0.5))
+    needed = step.sweeps.iterations
+    # Exactly as many sweeps as needed: reached with the last one, so it counts.
+    _, (_, last) = _run(loop(0.5), limit=needed)
+    assert last.sweeps.iterations == needed
+    with pytest.raises(RunError, match=rf"no convergence in {needed - 1} sweeps: .*b\.x \(largest at index 0:"):
+        _run(loop(0.5), limit=needed - 1)
+    _, (_, tolerated) = _run(loop(0.5), limit=needed - 1, fail=False)
+    assert not tolerated.sweeps.converged
+    assert last.sweeps.converged
+    assert tolerated.sweeps.loops[0].history[-1]["b.x"] > 1e-10
+
+
+def test_units_outside_the_loop_step_once_and_in_its_order(loop: Any, fake: Any, port: Any) -> None:
+    units = loop(0.5)
+    units["after"] = fake("after", [port("x")], [port("z")], law=lambda inputs, *_: {"z": 2.0 * inputs["x"][0]})
+    units["after"].inputs["x"] = units["b"].outputs["x"]
+    units["after"]._in["x"] = np.zeros(1)
+    units["before"] = fake("before", outputs=[port("w")], law=lambda *_: {"w": 1.0})
+    master, steps = _run(units, steps=2)
+    # In the second step the loop is where it was: one sweep shows that.
+    assert steps[1].sweeps.iterations > 10
+    assert steps[2].sweeps.iterations == 1
+    for name in ("before", "after"):
+        assert [call[1] for call in units[name].calls].count("step") == 2
+        assert "restore" not in [call[1] for call in units[name].calls]
+    # It saw the loop's last value, not one on the way there.
+    assert float(master.exchange.value("after", "z")) == pytest.approx(4.0, rel=1e-8)
+
+
+def test_every_sweep_starts_where_the_step_began_and_states_are_given_up(loop: Any) -> None:
+    units = loop(0.5)
+    _run(units, steps=3)
+    for unit in units.values():
+        calls = [call[1] for call in unit.calls]
+        assert calls.count("restore") == calls.count("step") - 3
+        assert calls.count("save") == calls.count("free") == 3
+    diverging = loop(2.0)
+    with pytest.raises(RunError):
+        _run(diverging, limit=10)
+    for unit in diverging.values():
+        calls = [call[1] for call in unit.calls]
+        assert calls.count("save") == calls.count("free") == 1
+
+
+@pytest.mark.parametrize(
+    ("criterion", "limit"),
+    [
+        (Criterion(absolute=0.5), 0.5),
+        (Criterion(relative=0.01), 0.01 * 20.0),
+        (Criterion(residual_relative=0.1), 0.1 * 4.0),
+        (Criterion(absolute=0.3, relative=0.02), 0.02 * 20.0),
+    ],
+)
+def test_measures_on_both_sides_of_their_limits(criterion: Criterion, limit: float) -> None:
+    assert criterion.met(0.999 * limit, value=20.0, first=4.0)
+    assert not criterion.met(1.001 * limit, value=20.0, first=4.0)
+
+
+def test_a_field_without_a_criterion_is_measured_and_not_judged() -> None:
+    convergence = Convergence({"a.y": Criterion(absolute=1.0)})
+    values = {"a.y": np.ones(2), "b.x": np.ones(2)}
+    assert convergence.judge({"a.y": np.zeros(2), "b.x": np.full(2, 1e9)}, values)
+    assert convergence.history[-1]["b.x"] > 1e9
+    assert convergence.contraction_rate is None
+
+
+def test_a_loop_that_fails_says_when_and_that_earlier_results_stand(loop: Any) -> None:
+    units = loop(0.5)
+    law = units["a"].law
+    # From the second step on no sweep agrees with the one before it.
+    count = iter(range(1000))
+    units["a"].law = lambda inputs, outputs, time, size: (
+        law(inputs, outputs, time, size) if time == 0.0 else {"y": np.array([float(next(count))])}
+    )
+    with pytest.raises(RunError, match=r"^the coupling failed in the step from 1 to 2 ms: .* up to 1 ms are complete"):
+        _run(units, steps=3)
+
+
+def test_an_iteration_that_leaves_the_numbers_is_a_failure_of_the_coupling(loop: Any) -> None:
+    with pytest.raises(
+        RunError, match=r"^the coupling failed in the step from 0 to 1 ms: no convergence in 1 sweeps: b\.x"
+    ):
+        _run(loop(0.5), acceleration=Relaxation(np.inf))

@@ -1,0 +1,53 @@
+"""If this failed, the documentation would tell a newcomer something that is not so."""
+
+import importlib.util
+import shlex
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+from cardiac_cosim.orchestrator.scenario import load_scenario
+
+_ROOT = Path(__file__).parent.parent
+
+
+def test_tables_of_the_units_are_those_of_the_declarations() -> None:
+    spec = importlib.util.spec_from_file_location("unit_tables", _ROOT / "docs" / "unit_tables.py")
+    assert spec is not None
+    assert spec.loader is not None
+    tables = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tables)
+    assert tables.PAGE.read_text(encoding="utf-8") == tables.page(), "run `python docs/unit_tables.py`"
+
+
+def test_ci_runs_the_test_command_of_the_readme() -> None:
+    command = "./setup.sh test && .venv/bin/python -m pytest -n 2"
+    assert f"```sh\n{command}\n```" in (_ROOT / "README.md").read_text(encoding="utf-8")
+    assert (_ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()[-1] == command
+
+
+def test_every_file_that_the_readme_links_to_is_there() -> None:
+    for part in (_ROOT / "README.md").read_text(encoding="utf-8").split("](")[1:]:
+        target = part.split(")")[0]
+        if not target.startswith("http"):
+            assert (_ROOT / target).exists(), target
+
+
+def test_every_run_that_the_readme_shows_has_a_valid_scenario() -> None:
+    text = (_ROOT / "README.md").read_text(encoding="utf-8").replace("\\\n", " ")
+    runs = [shlex.split(line, comments=True) for line in text.splitlines() if line.startswith("cosim run ")]
+    assert len(runs) >= 4
+    for words in runs:
+        assignments = [value for option, value in pairwise(words) if option == "--set"]
+        load_scenario(_ROOT / words[2], assignments)
+
+
+def test_every_scenario_is_valid() -> None:
+    scenarios = sorted((_ROOT / "scenarios").glob("*.yaml"))
+    assert scenarios
+    for scenario in scenarios:
+        assert load_scenario(scenario).name == scenario.stem
+
+
+def test_supported_python_is_the_one_that_runs() -> None:
+    assert (3, 11) <= sys.version_info[:2] <= (3, 13)
