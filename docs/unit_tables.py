@@ -1,0 +1,55 @@
+"""Writes docs/units.md, the tables of every unit's variables, from the units' own declarations."""
+
+from pathlib import Path
+
+from cardiac_cosim.units.registry import UNITS
+from cardiac_cosim.units.unit import Unit
+from cardiac_cosim.units.variable import Causality, Location, Variable
+
+PAGE = Path(__file__).parent / "units.md"
+
+
+def page() -> str:
+    """The text of docs/units.md."""
+    origin = "Written by `python docs/unit_tables.py` from the declarations in `units/`."
+    parts = [f"# The units and their variables\n\n{origin}\n"]
+    return "\n".join(parts + [_unit(unit) for unit in UNITS.values()])
+
+
+def _unit(unit: type[Unit]) -> str:
+    summary = (unit.__doc__ or "").splitlines()[0]
+    lines = [f"## `{unit.name}`\n", f"{summary}\n"]
+    fields = [variable for variable in unit.variables() if variable.causality is not Causality.PARAMETER]
+    parameters = [variable for variable in unit.variables() if variable.causality is Causality.PARAMETER]
+    lines += ["| variable | | unit | shape | description |", "|---|---|---|---|---|"]
+    lines += [
+        f"| `{item.name}` | {item.causality.value} | {item.unit} | {_shape(item)} | {item.description}{_note(item)} |"
+        for item in fields
+    ]
+    lines += ["", "| parameter | default | unit | range | description |", "|---|---|---|---|---|"]
+    lines += [
+        f"| `{item.name}` | {item.start} | {item.unit} | {_range(item)} | {item.description} |" for item in parameters
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _shape(variable: Variable) -> str:
+    place = {Location.GLOBAL: "", Location.NODE: "nodes", Location.ELEMENT: "elements"}[variable.location]
+    return "scalar" if not place else place if variable.components == 1 else f"{place} × {variable.components}"
+
+
+def _note(variable: Variable) -> str:
+    notes = ["once, at initialisation"] if variable.fixed else []
+    notes += [f"only where `{variable.needs}` is not 0"] if variable.needs else []
+    return f" ({', '.join(notes)})" if notes else ""
+
+
+def _range(variable: Variable) -> str:
+    if variable.choices:
+        return ", ".join(f"`{choice}`" for choice in variable.choices)
+    bounds = ((">", variable.above), ("≥", variable.at_least), ("<", variable.below))
+    return ", ".join(f"{sign} {bound:g}" for sign, bound in bounds if bound is not None)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
