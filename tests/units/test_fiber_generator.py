@@ -274,6 +274,18 @@ def test_missing_boundary_is_named(missing: str, tube, started) -> None:
         started(FiberGenerator, Mesh(mesh.points, mesh.cells, rest))
 
 
+def test_a_left_ventricle_is_told_from_two_whose_right_one_has_no_names(tube, started) -> None:
+    mesh = tube(2)
+    left = {"lv_endocardium": ("lv_endocardium", "rv_endocardium"), "epicardium": ("epicardium", "rv_septum")}
+    named = {name: np.concatenate([mesh.boundary(part) for part in parts]) for name, parts in left.items()}
+    with pytest.raises(InvalidInput, match=r"no boundary named 'rv_endocardium' or 'rv_septum', and .* have no name"):
+        started(FiberGenerator, Mesh(mesh.points, mesh.cells, named))
+    taken = {tuple(face) for faces in named.values() for face in np.sort(faces, axis=1).tolist()}
+    rest = [face for face in mesh.surface.tolist() if tuple(sorted(face)) not in taken]
+    whole = started(FiberGenerator, Mesh(mesh.points, mesh.cells, named | {"base": np.array(rest)}))
+    np.testing.assert_array_equal(whole.get("fiber"), started(FiberGenerator, mesh).get("fiber"))
+
+
 def test_fibre_in_a_horizontal_wall_is_measured_from_the_x_axis(box, started) -> None:
     plate = box(
         [0.0, 1.0, 2.0],

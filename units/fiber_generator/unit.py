@@ -16,15 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
-from ..mesh import Mesh
+from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Location, Variable, parameter
 from .transmural import transmural_direction, wall_distance
-
-#: The inner and outer surfaces of walls, as far as a mesh has them; `endocardium` is that of a piece of wall.
-ENDOCARDIUM = ("lv_endocardium", "rv_endocardium", "endocardium")
-EPICARDIUM = ("epicardium", "rv_septum")
 
 #: Sum of the two wall distances in mm that is zero but for rounding.
 _TOUCHING_MM = 1e-9
@@ -72,11 +68,6 @@ def _along_x(elements: int) -> dict[str, FloatArray]:
     return {name: np.tile(axis, (elements, 1)) for name, axis in (("fiber", np.eye(3)[0]), ("sheet", np.eye(3)[1]))}
 
 
-def _present(mesh: Mesh, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of the boundaries that the mesh has; all, for the error that follows, where it has none."""
-    return tuple(name for name in names if name in mesh.boundaries) or names
-
-
 class FiberGenerator(Unit):
     """Rule-based fibres; it has no inputs and a step changes nothing."""
 
@@ -111,9 +102,11 @@ class FiberGenerator(Unit):
         mesh = self.mesh
         if mesh.dimension < 3:
             return _along_x(mesh.elements)
-        inner, outer = _present(mesh, ENDOCARDIUM), _present(mesh, EPICARDIUM)
-        sheet = transmural_direction(mesh, inner, outer)
-        inward = relative_distance(wall_distance(mesh.points, mesh, outer), wall_distance(mesh.points, mesh, inner))
+        wall = wall_of(mesh)
+        sheet = transmural_direction(mesh, wall.endocardium, wall.epicardium)
+        inward = relative_distance(
+            wall_distance(mesh.points, mesh, wall.epicardium), wall_distance(mesh.points, mesh, wall.endocardium)
+        )
         angle = self.parameters(HelixRule).angle(inward[mesh.cells].mean(axis=1), mesh.centroids[:, 2])
         return {"fiber": rotated_fiber(sheet, angle), "sheet": sheet}
 

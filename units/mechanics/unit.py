@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
-from ..mesh import Mesh
+from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Location, Record, Variable
@@ -32,9 +32,6 @@ _MPA_PER_KPA = 1e-3
 
 #: Stress in the undeformed tissue, relative to its shear modulus, that is rounding.
 _STRESS_FREE = 1e-9
-
-#: The surfaces around each cavity.
-_CAVITIES = {"lv_volume": ("lv_endocardium",), "rv_volume": ("rv_endocardium", "rv_septum")}
 
 _FOLLOWS_ALL = ("active_stress", "fiber", "sheet")
 
@@ -90,9 +87,7 @@ class Mechanics(Unit):
         self._equilibrium = Equilibrium(
             self._solid, elastic.shear_modulus_MPa * element_size**2, self.parameters(Convergence)
         )
-        self._cavities = {
-            name: Cavity(self.mesh, surfaces) for name, surfaces in _CAVITIES.items() if _encloses(self.mesh, name)
-        }
+        self._cavities = {name: Cavity(self.mesh, surfaces) for name, surfaces in wall_of(self.mesh).cavities.items()}
         self._apex = int(self.mesh.points[:, 2].argmin())
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
@@ -147,10 +142,3 @@ class Mechanics(Unit):
         if name not in self._cavities:
             return frozen(0.0)
         return frozen(self._cavities[name].volume(self.mesh.points + displacement))
-
-
-def _encloses(mesh: Mesh, name: str) -> bool:
-    """Whether a scene has this cavity: a piece of wall has none, a left ventricle alone only its own."""
-    if "endocardium" in mesh.boundaries:
-        return False
-    return name == "lv_volume" or any(surface in mesh.boundaries for surface in _CAVITIES[name])
