@@ -32,12 +32,17 @@ class Run:
         return FMI_TYPES[type(self.variable.start)]
 
     def names(self) -> Iterator[str]:
-        """Scalar names in FMI's structured convention, base 1: `potential[7]`, `fiber[12,3]`."""
-        if not self.shape:
-            yield self.variable.name
-            return
-        for indices in product(*(range(1, count + 1) for count in self.shape)):
-            yield f"{self.variable.name}[{','.join(map(str, indices))}]"
+        """Names of the scalars, in the order of their value references."""
+        return scalar_names(self.variable.name, self.shape)
+
+
+def scalar_names(name: str, shape: tuple[int, ...]) -> Iterator[str]:
+    """Scalars of an array in FMI's structured convention, base 1 and row-major: `potential[7]`, `fiber[12,3]`."""
+    if not shape:
+        yield name
+        return
+    for indices in product(*(range(1, count + 1) for count in shape)):
+        yield f"{name}[{','.join(map(str, indices))}]"
 
 
 def layout(unit: type[Unit], mesh: Mesh) -> tuple[Run, ...]:

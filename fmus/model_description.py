@@ -20,7 +20,7 @@ from ..units.mesh import Mesh
 from ..units.unit import Unit
 from ..units.variable import Causality, Location, Record
 from .layout import Run, layout
-from .slave import INVALID_INPUT
+from .messages import INVALID_INPUT
 
 #: Name under which the annotations that FMI has no place for (locations, recording) stand in VendorAnnotations.
 TOOL = "cardiac-cosim"
@@ -51,8 +51,8 @@ _CAPABILITIES = {
 }
 
 
-def model_description(unit: type[Unit], mesh: Mesh, guid: str) -> str:
-    """The XML text for `unit` on `mesh`."""
+def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str:
+    """The XML text for `unit` on `mesh`; `tool` is what made the FMU."""
     runs = layout(unit, mesh)
     return "\n".join(
         [
@@ -65,7 +65,7 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str) -> str:
                 description=(unit.__doc__ or "").splitlines()[0],
                 version=version(TOOL),
                 license="BSD-3-Clause",
-                generationTool=f"{TOOL} {version(TOOL)} with PythonFMU {version('pythonfmu')}",
+                generationTool=tool,
                 variableNamingConvention="structured",
             ),
             _tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),

@@ -1,252 +1,181 @@
-"""A unit as pythonfmu's slave: what runs inside an FMU.
+"""A unit as the slave of this project's own wrapper (`wrapper/`): what runs inside an FMU.
 
-Two rules come from the wrapper around this class. An exception that leaves one of these methods ends the instance
-with fmi2Fatal and damages its reference counts; so none does: it is logged, and from then on every step is refused
-(fmi2Discard) and every Real reads as NaN, because the wrapper has no other way to return an error, until the instance
-is reset or goes back to a saved state. And values cross as Python lists, scalar by scalar; a whole field is recognised
-and moved in one piece.
+Every method returns (status, value, messages) and raises nothing. A mistake of the caller is fmi2Error, and so is what
+follows it until the instance is reset or goes back to a saved state; Reals that could not be read are NaN, for hosts
+that do not look at the status. A step that fails is fmi2Discard and leaves the unit as it was.
 """
 
-import traceback
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any
 
 import numpy as np
-from pythonfmu import Fmi2Slave
-from pythonfmu.enums import Fmi2Status
 
-from ..units.errors import InvalidInput, StepFailure
-from ..units.mesh.archive import unpack_mesh
-from ..units.registry import UNITS
 from ..units.snapshot import Snapshot
-from ..units.unit import Phase
-from ..units.variable import Causality
-from .layout import Run, layout
+from .instance import UnitInstance
+from .messages import REFUSED, WARNING_CATEGORY, category, message
 
-MESH_FILE = "mesh.npz"
+#: fmi2Status.
+OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 
-#: Log category of an error that lies in what the caller gave, not in the physics.
-INVALID_INPUT = "invalidInput"
+#: What an Integer reads as that could not be read, for it has no NaN.
+NO_INTEGER = -(2**31)
 
-#: What an Integer reads as after a failure, which has no NaN.
-_NO_INTEGER = -(2**31)
+Answer = tuple[int, Any, list[tuple[int, str, str]]]
 
-_Result = TypeVar("_Result")
+_FINE: Answer = (OK, None, [])
 
 
-class UnitSlave(Fmi2Slave):  # type: ignore[misc]  # pythonfmu has no types
-    """The slave of the unit named `unit_name`, on the mesh in the FMU's resources."""
+class Slave:
+    """The slave of the unit `name`, on the mesh in the folder `resources`."""
 
-    unit_name: ClassVar[str]
-
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.modelName = self.unit_name
-        mesh = unpack_mesh(Path(self.resources) / MESH_FILE)
-        self._unit = UNITS[self.unit_name](mesh)
-        self._runs = layout(type(self._unit), mesh)
-        self._firsts = np.array([run.first for run in self._runs])
-        self._whole = {(run.first, run.size): (run, list(range(run.first, run.first + run.size))) for run in self._runs}
-        # Inputs set scalar by scalar are collected here and given to the unit in one piece before it needs them.
-        self._staged: dict[str, np.ndarray] = {}
-        self._read: dict[str, np.ndarray] = {}
+    def __init__(self, name: str, resources: str) -> None:
+        self._instance = UnitInstance(name, resources)
         self._failed = False
 
     # --- life cycle ---------------------------------------------------------------------------------------------------
 
-    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
-        """fmi2SetupExperiment."""
-        self._guarded(lambda: self._unit.setup_experiment(start_time, stop_time), None)
+    def setup_experiment(self, start_time: float, stop_time: float) -> Answer:
+        """fmi2SetupExperiment; a stop time that is not defined is infinite."""
+        return self._guarded(lambda: self._instance.unit.setup_experiment(start_time, stop_time))
 
-    def enter_initialization_mode(self) -> None:
+    def enter_initialization_mode(self) -> Answer:
         """fmi2EnterInitializationMode."""
-        self._guarded(self._unit.enter_initialization_mode, None)
+        return self._guarded(self._instance.unit.enter_initialization_mode)
 
-    def exit_initialization_mode(self) -> None:
+    def exit_initialization_mode(self) -> Answer:
         """fmi2ExitInitializationMode."""
-        self._guarded(lambda: self._advance(self._unit.exit_initialization_mode), None)
+        return self._guarded(self._instance.exit_initialization_mode)
 
-    def do_step(self, current_time: float, step_size: float) -> bool:
-        """fmi2DoStep; False makes it fmi2Discard, with the reason in the log and the unit's state as before."""
+    def do_step(self, time: float, size: float) -> Answer:
+        """fmi2DoStep."""
         # An input that is wrong is an error of the call that set it, not of this step: trying again does not help.
-        self._guarded(self._flush, None)
-        if self._failed:
-            self.log(
-                "the step is refused because an earlier call failed; reset the instance or restore a saved state",
-                Fmi2Status.error,
-            )
-            return False
+        flushed = self._guarded(self._instance.flush, "step")
+        if flushed[0] == ERROR:
+            return flushed
         try:
-            self._advance(lambda: self._unit.do_step(current_time, step_size))
+            self._instance.do_step(time, size)
         except Exception as error:
-            self._log_failure(error)
-            return False
-        return True
+            return DISCARD, None, [(ERROR, category(error), message(error))]
+        return _FINE
 
-    def terminate(self) -> None:
+    def terminate(self) -> Answer:
         """fmi2Terminate."""
-        self._guarded(self._unit.terminate, None)
+        return self._guarded(self._instance.unit.terminate)
+
+    def reset(self) -> Answer:
+        """fmi2Reset."""
+        self._failed = False
+        return self._guarded(self._instance.reset)
 
     # --- values -------------------------------------------------------------------------------------------------------
 
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
+    def set_real(self, references: memoryview, values: memoryview) -> Answer:
         """fmi2SetReal: whole fields at once, or any scalars."""
-        self._guarded(lambda: self._set("Real", vrs, values), None)
+        return self._guarded(
+            lambda: self._instance.set_reals(_references(references), np.frombuffer(values, np.float64))
+        )
 
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+    def get_real(self, references: memoryview, values: memoryview) -> Answer:
+        """fmi2GetReal: whole fields at once, or any scalars."""
+        target = np.frombuffer(values, np.float64)
+        warnings: list[str] = []
+
+        def read() -> None:
+            found, told = self._instance.get_reals(_references(references))
+            target[:] = found
+            warnings.extend(told)
+
+        answer = self._guarded(read, "value")
+        if answer[0] == ERROR:
+            target[:] = np.nan
+        elif warnings:
+            return WARNING, None, [(WARNING, WARNING_CATEGORY, text) for text in warnings]
+        return answer
+
+    def set_integer(self, references: memoryview, values: memoryview) -> Answer:
         """fmi2SetInteger: whole-number parameters."""
-        self._guarded(lambda: self._set("Integer", vrs, values), None)
+        return self._set("Integer", references, np.frombuffer(values, np.int32).tolist())
 
-    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+    def set_boolean(self, references: memoryview, values: memoryview) -> Answer:
         """fmi2SetBoolean: no unit has such a variable; the error names the one that was meant."""
-        self._guarded(lambda: self._set("Boolean", vrs, values), None)
+        return self._set("Boolean", references, np.frombuffer(values, np.int32).astype(bool).tolist())
 
-    def set_string(self, vrs: list[int], values: list[str]) -> None:
+    def set_string(self, references: memoryview, values: list[str]) -> Answer:
         """fmi2SetString: parameters that choose between named options."""
-        self._guarded(lambda: self._set("String", vrs, values), None)
+        return self._set("String", references, values)
 
-    def get_real(self, vrs: list[int]) -> list[float]:
-        """fmi2GetReal: whole fields at once, or any scalars; NaN after a failure."""
-        return self._guarded(lambda: self._get(vrs), [np.nan] * len(vrs))
-
-    def get_integer(self, vrs: list[int]) -> list[int]:
+    def get_integer(self, references: memoryview, values: memoryview) -> Answer:
         """fmi2GetInteger."""
-        return self._guarded(lambda: [self._scalar("Integer", vr) for vr in vrs], [_NO_INTEGER] * len(vrs))
+        return self._get_numbers("Integer", references, values)
 
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
+    def get_boolean(self, references: memoryview, values: memoryview) -> Answer:
         """fmi2GetBoolean."""
-        return self._guarded(lambda: [self._scalar("Boolean", vr) for vr in vrs], [False] * len(vrs))
+        return self._get_numbers("Boolean", references, values)
 
-    def get_string(self, vrs: list[int]) -> list[str]:
-        """fmi2GetString."""
-        return self._guarded(lambda: [self._scalar("String", vr) for vr in vrs], [""] * len(vrs))
+    def get_string(self, references: memoryview) -> Answer:
+        """fmi2GetString; the value is a list of bytes in UTF-8."""
+        texts: list[bytes] = []
+
+        def read() -> None:
+            found = self._instance.get_scalars("String", _references(references).tolist())
+            texts.extend(text.encode() for text in found)
+
+        status, _, messages = self._guarded(read, "value")
+        return status, texts, messages
 
     # --- state --------------------------------------------------------------------------------------------------------
 
-    def _get_fmu_state(self) -> Snapshot | None:
-        return self._guarded(lambda: self._advance(self._unit.get_state), None)
+    def get_state(self) -> Answer:
+        """fmi2GetFMUstate."""
+        states: list[Snapshot] = []
+        status, _, messages = self._guarded(lambda: states.append(self._instance.get_state()), "state")
+        return status, states[0] if states else None, messages
 
-    def _set_fmu_state(self, state: Snapshot | None) -> None:
-        def restore() -> None:
-            if state is None:
-                raise InvalidInput("the state given to fmi2SetFMUstate is none of this FMU")
-            self._staged.clear()
-            self._unit.set_state(state)
-            # The state holds every input as well: nothing is left of what failed.
-            self._failed = False
+    def set_state(self, state: Snapshot | None) -> Answer:
+        """fmi2SetFMUstate: nothing is left of what failed before."""
+        self._failed = False
+        return self._guarded(lambda: self._instance.set_state(state))
 
-        self._read.clear()
-        self._guarded(restore, None)
+    def state_to_bytes(self, state: Snapshot | None) -> Answer:
+        """fmi2SerializeFMUstate."""
+        return OK, b"" if state is None else state.to_bytes(), []
 
-    @staticmethod
-    def _fmu_state_to_bytes(state: Snapshot | None) -> bytes:
-        return b"" if state is None else state.to_bytes()
-
-    @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> Snapshot | None:
+    def state_from_bytes(self, data: bytes) -> Answer:
+        """fmi2DeSerializeFMUstate; possible also after a failure, for a saved state is the way back from it."""
         try:
-            return Snapshot.from_bytes(state)
+            return OK, Snapshot.from_bytes(data), []
         # Whatever damaged bytes trip their reader over.
-        except Exception:
-            # There is no instance to log to here; fmi2SetFMUstate says what is wrong.
-            return None
+        except Exception as error:
+            self._failed = True
+            return ERROR, None, [(ERROR, category(error), f"these bytes are no state of an FMU: {error}")]
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _set(self, fmi_type: str, vrs: list[int], values: list[Any]) -> None:
-        whole = self._whole.get((vrs[0], len(vrs))) if vrs else None
-        if whole is not None and whole[1] == vrs:
-            run = self._run(vrs[0], fmi_type)
-            self._staged.pop(run.variable.name, None)
-            self._read.pop(run.variable.name, None)
-            self._unit.set(run.variable.name, values[0] if not run.shape else np.array(values).reshape(run.shape))
-            return
-        for vr, value in zip(vrs, values, strict=True):
-            run = self._run(vr, fmi_type)
-            if run.variable.causality is Causality.PARAMETER:
-                self._read.pop(run.variable.name, None)
-                self._unit.set(run.variable.name, value)
-            else:
-                self._stage(run)[vr - run.first] = value
+    def _set(self, fmi_type: str, references: memoryview, values: list[Any]) -> Answer:
+        return self._guarded(lambda: self._instance.set_scalars(fmi_type, _references(references).tolist(), values))
 
-    def _stage(self, run: Run) -> np.ndarray:
-        name = run.variable.name
-        if name not in self._staged:
-            if run.variable.causality is not Causality.INPUT:
-                raise InvalidInput(f"'{name}' is an output and cannot be set")
-            self._staged[name] = np.array(self._unit.get(name), dtype=float).ravel()
-            self._read.pop(name, None)
-        return self._staged[name]
+    def _get_numbers(self, fmi_type: str, references: memoryview, values: memoryview) -> Answer:
+        target = np.frombuffer(values, np.int32)
 
-    def _flush(self) -> None:
-        while self._staged:
-            name, values = self._staged.popitem()
-            self._unit.set(name, values.reshape(self._unit.variable(name).shape(self._unit.mesh)))
+        def read() -> None:
+            target[:] = self._instance.get_scalars(fmi_type, _references(references).tolist())
 
-    def _advance(self, call: Callable[[], _Result]) -> _Result:
-        self._flush()
-        self._read.clear()
-        return call()
+        answer = self._guarded(read, "value")
+        if answer[0] == ERROR:
+            target[:] = NO_INTEGER
+        return answer
 
-    def _get(self, vrs: list[int]) -> list[float]:
+    def _guarded(self, call: Callable[[], None], refusing: str = "call") -> Answer:
+        """`call`, unless an earlier one failed; `refusing` is what the host is told to be refused then."""
         if self._failed:
-            return [np.nan] * len(vrs)
-        self._flush()
-        whole = self._whole.get((vrs[0], len(vrs))) if vrs else None
-        if whole is not None and whole[1] == vrs:
-            return self._values(self._run(vrs[0], "Real")).tolist()
-        references = np.array(vrs, dtype=np.int64)
-        values = np.empty(len(vrs))
-        owner = np.searchsorted(self._firsts, references, side="right") - 1
-        for number in np.unique(owner):
-            run = self._run(int(references[owner == number].max()), "Real")
-            values[owner == number] = self._values(run)[references[owner == number] - run.first]
-        return values.tolist()
-
-    def _values(self, run: Run) -> np.ndarray:
-        name = run.variable.name
-        if run.variable.causality is Causality.OUTPUT and self._unit.phase not in (Phase.STEPPING, Phase.TERMINATED):
-            self.log(
-                f"'{name}' has no value before the initialization is complete; it reads as NaN", Fmi2Status.warning
-            )
-            return np.full(run.size, np.nan)
-        if name not in self._read:
-            self._read[name] = np.asarray(self._unit.get(name), dtype=float).reshape(-1)
-        return self._read[name]
-
-    def _scalar(self, fmi_type: str, vr: int) -> Any:
-        return self._unit.get(self._run(vr, fmi_type).variable.name)
-
-    def _run(self, vr: int, fmi_type: str) -> Run:
-        """The run that holds `vr`, which has to be of the type that the caller took it for."""
-        run = self._runs[int(np.searchsorted(self._firsts, vr, side="right")) - 1]
-        if not run.first <= vr < run.first + run.size:
-            raise InvalidInput(f"unit '{self.unit_name}' has no value reference {vr}")
-        if run.fmi_type != fmi_type:
-            raise InvalidInput(
-                f"value reference {vr}, '{run.variable.name}', is of type {run.fmi_type}, not {fmi_type}"
-            )
-        return run
-
-    def _guarded(self, call: Callable[[], _Result], otherwise: _Result) -> _Result:
+            return ERROR, None, [(ERROR, category(Exception()), REFUSED.format(call=refusing))]
         try:
-            return call()
+            call()
         except Exception as error:
             self._failed = True
-            self._log_failure(error)
-            return otherwise
+            return ERROR, None, [(ERROR, category(error), message(error))]
+        return _FINE
 
-    def log(self, msg: str, status: Fmi2Status = Fmi2Status.ok, category: str | None = None, debug: Any = None) -> None:
-        """See Fmi2Slave. In FMI 2.0 a message is a printf format: a percent sign has to be written twice."""
-        super().log(msg.replace("%", "%%"), status, category)
 
-    def _log_failure(self, error: Exception) -> None:
-        if isinstance(error, InvalidInput):
-            self.log(str(error), Fmi2Status.error, INVALID_INPUT)
-        elif isinstance(error, StepFailure):
-            self.log(str(error), Fmi2Status.error)
-        else:
-            # The reason comes first: some hosts cut a message off (FMPy after 2047 characters).
-            reason = "".join(traceback.format_exception_only(error))
-            self.log(reason + "".join(traceback.format_exception(error)), Fmi2Status.error)
+def _references(view: memoryview) -> np.ndarray:
+    return np.frombuffer(view, np.uint32).astype(np.int64)

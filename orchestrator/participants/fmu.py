@@ -18,7 +18,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2Integer
 
-from ...fmus.model_description import INPUT_INTERPOLATION
+from ...fmus.model_description import INPUT_INTERPOLATION, TOOL
 from ..errors import InputError, ParticipantError
 from .fmu_log import FmuLog
 from .fmu_variables import (
@@ -61,7 +61,7 @@ class FmuParticipant:
             self._takes_derivatives = bool(description.coSimulation.canInterpolateInputs)
             self._pending = PendingRamps()
             self._ramps: dict[str, Ramp] = {}
-            self._log = FmuLog(formats="PythonFMU" not in (description.generationTool or ""))
+            self._log = FmuLog(formats=not _gives_texts(description.generationTool or ""))
             try:
                 self._extract(path)
                 self._instantiate(description)
@@ -266,6 +266,11 @@ def _abilities(declared: Any, ramps_itself: bool, memoryless: bool) -> Abilities
         any_step_size=bool(declared.canHandleVariableCommunicationStepSize),
         memoryless=memoryless,
     )
+
+
+def _gives_texts(tool: str) -> bool:
+    """Whether the FMUs that `tool` made log plain texts: they never give arguments."""
+    return "PythonFMU" in tool or tool.startswith(TOOL)
 
 
 def _set_derivatives(references: Any, size: int, orders: Any, values: Any, slave: FMU2Slave) -> None:

@@ -14,7 +14,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from ...fmus.slave import INVALID_INPUT
+from ...fmus.messages import INVALID_INPUT
 
 #: fmi2Status from which a message tells of a failure.
 _ERROR = 3

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cardiac_cosim.fmus import wrapper
 from cardiac_cosim.fmus.build import build_fmu
 from cardiac_cosim.units.geometry import registry
 from cardiac_cosim.units.mesh import Mesh
@@ -128,8 +129,18 @@ def cases(tiny: Mesh) -> dict[str, Case]:
     return _cases(tiny)
 
 
+@pytest.fixture(scope="session", params=["own", "pythonfmu"])
+def binary(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Whose wrapper the FMUs have that are built in a test; ours is compiled wherever the tests run."""
+    assert wrapper.library() is not None
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "pythonfmu":
+            patch.setattr(wrapper, "library", lambda: None)
+        yield request.param
+
+
 @pytest.fixture(scope="session")
-def fmus(tiny: Mesh, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def fmus(tiny: Mesh, binary: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The FMUs of all units on the tiny mesh."""
     folder = tmp_path_factory.mktemp("tiny")
     return {name: build_fmu(unit, tiny, folder / f"{name}.fmu") for name, unit in UNITS.items()}

@@ -21,6 +21,31 @@ from fmpy.fmi2 import (
 DISCARD = 2
 ERROR = 3
 
+#: What a host that does not look at the status has of a call that failed.
+_NOTHING = {"getReal": float("nan"), "getInteger": -(2**31), "getBoolean": False, "getString": ""}
+
+
+class _Lenient:
+    """FMPy's FMU2Slave, whose failing calls are noted in `refused` instead of raised."""
+
+    def __init__(self, fmu: FMU2Slave, refused: list[tuple[str, int]]) -> None:
+        self._fmu = fmu
+        self._refused = refused
+
+    def __getattr__(self, name: str) -> Any:
+        attribute = getattr(self._fmu, name)
+        if not callable(attribute) or name == "doStep":
+            return attribute
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            try:
+                return attribute(*arguments, **named)
+            except FMICallException as error:
+                self._refused.append((name, error.status))
+                return [_NOTHING[name]] * len(arguments[0]) if name in _NOTHING else None
+
+        return call
+
 
 class Driver:
     """One instance of one FMU, driven with FMPy's plain lists; a field is all scalars of one name, as declared."""
@@ -33,6 +58,11 @@ class Driver:
             self.fields.setdefault(variable.name.split("[")[0], []).append(variable.valueReference)
         #: (status, category, text) of every message, in order; a doubled percent sign of the printf format is undone.
         self.messages: list[tuple[int, str, str]] = []
+        #: (call, status) of every call but a step that came back with another status than OK or Warning.
+        self.refused: list[tuple[str, int]] = []
+        self.has_own_wrapper = "PythonFMU" not in (self.description.generationTool or "")
+        #: The status of a step that is refused because an earlier call failed.
+        self.given_up = ERROR if self.has_own_wrapper else DISCARD
         self.folder = str(extract(str(path), tempfile.mkdtemp(prefix="driver-")))
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
@@ -45,15 +75,17 @@ class Driver:
         self.messages.append((status, (category or b"").decode(), message.decode().replace("%%", "%")))
 
     def instantiate(self) -> None:
-        self.fmu = FMU2Slave(
+        fmu = FMU2Slave(
             guid=self.description.guid,
             unzipDirectory=self.folder,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName=self._instance,
         )
-        self.fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
-        # Against a flaw of PythonFMU's wrapper, which otherwise frees this object twice at the end of the process.
-        self.fmu.dll.finalizePythonInterpreter()
+        fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+        if not self.has_own_wrapper:
+            # A flaw: it otherwise frees this object twice at the end of the process.
+            fmu.dll.finalizePythonInterpreter()
+        self.fmu: Any = _Lenient(fmu, self.refused)
 
     def free(self) -> None:
         self.fmu.freeInstance()

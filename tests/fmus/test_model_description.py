@@ -157,7 +157,7 @@ def test_a_start_value_keeps_all_its_digits(tiny: Mesh, monkeypatch: pytest.Monk
     kind = UNITS["active_stress"]
     potential, *others = kind.fields
     monkeypatch.setattr(kind, "fields", (replace(potential, start=-100.0 / 3.0), *others))
-    root = etree.fromstring(model_description(kind, tiny, "{0}").encode())
+    root = etree.fromstring(model_description(kind, tiny, "{0}", "a test").encode())
     (start,) = root.xpath("//ScalarVariable[@name='potential[1]']/Real/@start")
     assert float(start) == -100.0 / 3.0
 

@@ -1,0 +1,28 @@
+"""What an FMU tells its host's logger of an exception."""
+
+import traceback
+
+from ..units.errors import InvalidInput, StepFailure
+
+#: Log category of an error that lies in what the caller gave, not in the physics.
+INVALID_INPUT = "invalidInput"
+
+#: Log category of every other error, and that of warnings.
+ERROR_CATEGORY = "logStatusError"
+WARNING_CATEGORY = "logStatusWarning"
+
+#: Why nothing more is done after an error (FMI 2.0.4, section 2.1.3: fmi2Error).
+REFUSED = "the {call} is refused because an earlier call failed; reset the instance or restore a saved state"
+
+
+def category(error: Exception) -> str:
+    """The log category of `error`."""
+    return INVALID_INPUT if isinstance(error, InvalidInput) else ERROR_CATEGORY
+
+
+def message(error: Exception) -> str:
+    """The words of an error that a unit foresees; of any other the reason and the traceback."""
+    if isinstance(error, (InvalidInput, StepFailure)):
+        return str(error)
+    # The reason comes first: some hosts cut a message off (FMPy after 2047 characters).
+    return "".join(traceback.format_exception_only(error)) + "".join(traceback.format_exception(error))

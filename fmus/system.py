@@ -1,0 +1,141 @@
+"""A system of connected FMUs, as all that is written for other tools sees it (`ssp`, `osp`, `container`)."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from ..units.errors import InvalidInput
+from .layout import scalar_names
+
+Shape = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Value:
+    """What the system gives to a variable before its initialisation, with the FMI 2.0 type and unit of that."""
+
+    name: str
+    fmi_type: str
+    text: str
+    unit: str | None = None
+
+
+@dataclass(frozen=True)
+class Component:
+    """An instance of the FMU in the file `fmu`.
+
+    `inputs` and `outputs` are the shapes of its Real fields by name, () for scalars. `given` holds parameters and start
+    values.
+    """
+
+    name: str
+    fmu: Path
+    inputs: Mapping[str, Shape]
+    outputs: Mapping[str, Shape]
+    given: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def description(self) -> Any:
+        """FMPy's model description."""
+        return fmpy.read_model_description(str(self.fmu), validate=False)
+
+    @cached_property
+    def variables(self) -> dict[str, Any]:
+        """FMPy's scalar variables by name."""
+        return {variable.name: variable for variable in self.description.modelVariables}
+
+    def unit_of(self, name: str, shape: Shape) -> str | None:
+        """Unit of measure of a field, if the FMU declares one."""
+        unit: str | None = self.variables[next(scalar_names(name, shape))].unit
+        return unit
+
+    def values(self) -> Iterator[Value]:
+        """All that is given, in the words of FMI; InvalidInput for a variable that the FMU does not have."""
+        for name, value in self.given.items():
+            if name not in self.variables:
+                raise InvalidInput(f"the FMU {self.fmu.name} of '{self.name}' has no variable '{name}'; remove its value")
+            variable = self.variables[name]
+            yield Value(name, variable.type, _text(variable, value), variable.unit)
+
+
+@dataclass(frozen=True)
+class Link:
+    """An output that feeds an input, both of `shape`, as factor · value + offset."""
+
+    source: str
+    output: str
+    target: str
+    input: str
+    shape: Shape = ()
+    factor: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the values arrive as they are."""
+        return (self.factor, self.offset) == (1.0, 0.0)
+
+    def scalars(self) -> Iterator[tuple[str, str]]:
+        """Output and input, scalar by scalar."""
+        return zip(scalar_names(self.output, self.shape), scalar_names(self.input, self.shape), strict=True)
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.output} -> {self.target}.{self.input}"
+
+
+@dataclass(frozen=True)
+class System:
+    """Components and their links; times in s.
+
+    `step_s` is the communication step that the system was made for: a hint, since a step is no part of a system.
+    """
+
+    name: str
+    components: tuple[Component, ...]
+    links: tuple[Link, ...]
+    stop_s: float
+    step_s: float
+
+    @cached_property
+    def files(self) -> dict[Path, str]:
+        """A file name for every FMU, unique among them: its own where that is free."""
+        taken: dict[Path, str] = {}
+        for component in self.components:
+            if component.fmu not in taken:
+                free = component.fmu.name not in taken.values()
+                taken[component.fmu] = component.fmu.name if free else f"{component.name}-{component.fmu.name}"
+        return taken
+
+    def component(self, name: str) -> Component:
+        """The component `name`."""
+        return next(component for component in self.components if component.name == name)
+
+    def linked_inputs(self, component: Component) -> dict[str, Shape]:
+        """The inputs of `component` that something feeds, in its own order."""
+        fed = {link.input for link in self.links if link.target == component.name}
+        return {name: shape for name, shape in component.inputs.items() if name in fed}
+
+    def linked_outputs(self, component: Component) -> dict[str, Shape]:
+        """The outputs of `component` that feed something, in its own order."""
+        feeding = {link.output for link in self.links if link.source == component.name}
+        return {name: shape for name, shape in component.outputs.items() if name in feeding}
+
+    def require_plain_links(self, tool: str) -> None:
+        """InvalidInput if a link transforms what it carries, which `tool` does not do for fields."""
+        for link in self.links:
+            if not link.is_plain:
+                raise InvalidInput(
+                    f"the connection {link} transforms its values, which cannot be written for {tool}; "
+                    "give the source the unit of the target"
+                )
+
+
+def _text(variable: Any, value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    # Of a float, as many digits as it takes to read the same one back.
+    return repr(float(value)) if variable.type == "Real" else str(value)
