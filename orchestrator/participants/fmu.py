@@ -1,7 +1,7 @@
-"""Any FMI 2.0 co-simulation FMU as a participant, through FMPy.
+"""Any FMI 2.0 or 3.0 co-simulation FMU as a participant, through FMPy.
 
 Fields live in buffers that are made once and handed to the raw FMI calls (see `fmu_variables`); FMPy's own lists cost
-ten times as much.
+ten times as much. What the two versions of FMI call differently is in `fmi2_calls` and `fmi3_calls`.
 """
 
 import shutil
@@ -11,29 +11,95 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2Integer
 
-from ...fmus.model_description import INPUT_INTERPOLATION, TOOL
+from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError
+from .fmi2_calls import Fmi2Calls
+from .fmi3_calls import Fmi3Calls
 from .fmu_log import FmuLog
 from .fmu_variables import (
+    Field,
     check_parameters,
     check_start,
     declares_ramps,
     is_memoryless,
     ramps_itself,
     real_fields,
-    scalar_type,
 )
 from .participant import Abilities, Parameters, Ramp, Values, Wait
 from .ramping import PendingRamps
 
 _FATAL = 4
+
+_Result = TypeVar("_Result")
+
+
+class Calls(Protocol):
+    """What a participant asks of its FMU, in one version of FMI.
+
+    All calls raise FMPy's FMICallException for a status worse than a warning. Times are in s.
+    """
+
+    #: Whether the FMU follows inputs inside a step by their derivatives.
+    takes_derivatives: bool
+
+    @property
+    def log(self) -> FmuLog:
+        """What the FMU logs."""
+
+    def instantiate(self, folder: Path, name: str) -> None:
+        """Load the FMU extracted in `folder`; FMPy raises plain Exceptions where it cannot."""
+
+    def free_instance(self) -> None:
+        """Free the instance and unload the FMU."""
+
+    def enter_initialization_mode(self) -> None:
+        """Begin the initialization, of an experiment from time 0 on."""
+
+    def exit_initialization_mode(self) -> None:
+        """End it."""
+
+    def terminate(self) -> None:
+        """End the simulation."""
+
+    def set(self, field: Field) -> None:
+        """Set an input from the field's buffer."""
+
+    def get(self, field: Field) -> None:
+        """Read an output into the field's buffer."""
+
+    def set_derivative(self, field: Field, order: int) -> None:
+        """Set an input's time derivative of `order` from the field's buffer, if the FMU takes derivatives."""
+
+    def set_start(self, variable: Any, value: Any) -> None:
+        """Set a variable of any type, an array to one value everywhere; `variable` is FMPy's."""
+
+    def step(self, time: float, size: float) -> None:
+        """Advance from `time` by `size`."""
+
+    def save(self) -> Any:
+        """The state."""
+
+    def restore(self, state: Any) -> None:
+        """Go back to a state."""
+
+    def free(self, state: Any) -> None:
+        """Give a state up."""
+
+    def pack(self, state: Any) -> bytes:
+        """A state as bytes."""
+
+    def unpack(self, data: bytes) -> Any:
+        """A state from bytes."""
+
+
+#: By the version that a model description begins with.
+_CALLS: dict[str, Callable[[Any], Calls]] = {"2.0": Fmi2Calls, "3.0": Fmi3Calls}
 
 
 class FmuParticipant:
@@ -43,7 +109,7 @@ class FmuParticipant:
         self, name: str, path: Path, parameters: Parameters, start: Parameters | None = None, ramps: bool = False
     ) -> None:
         self.name = name
-        self._slave: FMU2Slave | None = None
+        self._calls: Calls | None = None
         self._initialized = False
         self._folder: Path | None = None
         with self._naming(path):
@@ -58,13 +124,15 @@ class FmuParticipant:
             self._fields = {field.port.name: field for field in (*inputs, *outputs)}
             ramps_by_itself = ramps_itself(description.modelVariables, parameters)
             self.abilities = _abilities(description.coSimulation, ramps_by_itself, is_memoryless(path))
-            self._takes_derivatives = bool(description.coSimulation.canInterpolateInputs)
             self._pending = PendingRamps()
             self._ramps: dict[str, Ramp] = {}
-            self._log = FmuLog(formats=not _gives_texts(description.generationTool or ""))
+            calls = _CALLS[description.fmiVersion[:3]](description)
+            self._log = calls.log
+            self._takes_derivatives = calls.takes_derivatives
             try:
-                self._extract(path)
-                self._instantiate(description)
+                self._folder = Path(tempfile.mkdtemp(prefix="cosim-fmu-"))
+                _extract(path, self._folder)
+                self._instantiate(calls)
                 self._set_values(description.modelVariables, parameters, "parameter")
                 self._set_values(description.modelVariables, start or {}, "start value")
             except BaseException:
@@ -76,13 +144,12 @@ class FmuParticipant:
     def begin(self) -> None:
         """See Participant."""
         with self._blaming_input():
-            self._call(lambda slave: slave.setupExperiment(startTime=0.0))
-            self._call(lambda slave: slave.enterInitializationMode())
+            self._call(lambda calls: calls.enter_initialization_mode())
 
     def complete(self) -> None:
         """See Participant."""
         with self._blaming_input():
-            self._call(lambda slave: slave.exitInitializationMode())
+            self._call(lambda calls: calls.exit_initialization_mode())
         self._initialized = True
 
     def set(self, name: str, values: Values) -> None:
@@ -94,12 +161,12 @@ class FmuParticipant:
                 f"input '{name}' of unit '{self.name}' got shape {np.shape(values)}, expected {field.port.shape}"
             )
         field.values[...] = values
-        self._call(lambda slave: slave.fmi2SetReal(slave.component, field.references, field.size, field.buffer))
+        self._call(lambda calls: calls.set(field))
 
     def get(self, name: str) -> Values:
         """See Participant."""
         field = self._fields[name]
-        self._call(lambda slave: slave.fmi2GetReal(slave.component, field.references, field.size, field.buffer))
+        self._call(lambda calls: calls.get(field))
         return field.values.copy()
 
     def ramp(self, name: str, ramp: Ramp) -> None:
@@ -119,10 +186,10 @@ class FmuParticipant:
         return lambda: None
 
     def _step(self, time: float, size: float) -> None:
-        self._call(lambda slave: slave.doStep(time, size))
+        self._call(lambda calls: calls.step(time, size))
 
     def _differentiate(self, name: str, ramp: Ramp, size: float) -> None:
-        """Give an input as its value at the step's begin and its time derivatives there (FMI 2.0.4, section 4.2.1)."""
+        """Give an input as its value at the step's begin and its time derivatives there."""
         self.set(name, ramp.begin)
         slope = (ramp.end - ramp.begin) / size
         derivatives = [slope]
@@ -130,53 +197,47 @@ class FmuParticipant:
             derivatives = [slope - 0.5 * size * ramp.curvature, ramp.curvature]
         field = self._fields[name]
         for order, derivative in enumerate(derivatives, start=1):
-            orders = (fmi2Integer * field.size)(*[order] * field.size)
             field.values[...] = derivative
-            self._call(partial(_set_derivatives, field.references, field.size, orders, field.buffer))
+            self._call(partial(_set_derivative, field, order))
 
     def save(self) -> Any:
         """See Participant."""
-        states: list[Any] = []
-        self._call(lambda slave: states.append(slave.getFMUstate()))
-        return states[0]
+        return self._call(lambda calls: calls.save())
 
     def restore(self, state: Any) -> None:
         """See Participant."""
-        self._call(lambda slave: slave.setFMUstate(state))
+        self._call(lambda calls: calls.restore(state))
 
     def free(self, state: Any) -> None:
         """See Participant; without an instance there is nothing left to free."""
-        if self._slave is not None:
-            self._call(lambda slave: slave.freeFMUstate(state))
+        if self._calls is not None:
+            self._call(lambda calls: calls.free(state))
 
     def pack(self) -> bytes:
         """See Participant."""
-        packed: list[bytes] = []
         state = self.save()
         try:
-            self._call(lambda slave: packed.append(slave.serializeFMUstate(state)))
+            return self._call(lambda calls: calls.pack(state))
         finally:
             self.free(state)
-        return packed[0]
 
     def unpack(self, data: bytes) -> None:
         """See Participant."""
-        states: list[Any] = []
-        self._call(lambda slave: states.append(slave.deSerializeFMUstate(data)))
+        state = self._call(lambda calls: calls.unpack(data))
         try:
-            self.restore(states[0])
+            self.restore(state)
         finally:
-            self.free(states[0])
+            self.free(state)
 
     def close(self) -> None:
         """See Participant."""
-        slave, self._slave = self._slave, None
-        if slave is not None:
+        calls, self._calls = self._calls, None
+        if calls is not None:
             # An FMU that failed may refuse to terminate; freeing it is all that is left to do.
             with suppress(FMICallException):
                 if self._initialized:
-                    slave.terminate()
-            slave.freeInstance()
+                    calls.terminate()
+            calls.free_instance()
         if self._folder is not None:
             # An FMU written in Python puts its resources on the path of the process.
             sys.path[:] = [entry for entry in sys.path if not entry.startswith(str(self._folder))]
@@ -185,20 +246,21 @@ class FmuParticipant:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _call(self, call: Callable[[FMU2Slave], Any]) -> None:
+    def _call(self, call: Callable[[Calls], _Result]) -> _Result:
         """Do one FMI call; a bad status, or a logged error (all that some FMUs can return), raises ParticipantError."""
-        if self._slave is None:
+        if self._calls is None:
             raise ParticipantError(f"the FMU of unit '{self.name}' is closed")
         self._log.clear()
         try:
-            call(self._slave)
+            result = call(self._calls)
         except FMICallException as error:
             if error.status == _FATAL:
                 # FMI allows no further call, not even to free it; those written in Python would crash the process.
-                self._slave = None
+                self._calls = None
             raise ParticipantError(str(self._log) or f"{error} The FMU logged no reason") from None
         if self._log.errors:
             raise ParticipantError(str(self._log))
+        return result
 
     @contextmanager
     def _naming(self, path: Path) -> Iterator[None]:
@@ -218,42 +280,23 @@ class FmuParticipant:
                 raise InputError(f"unit '{self.name}': {error}") from None
             raise
 
-    def _extract(self, path: Path) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="cosim-fmu-"))
+    def _instantiate(self, calls: Calls) -> None:
+        if self._folder is None:
+            raise TypeError("an FMU is extracted before it is instantiated")
         try:
-            fmpy.extract(str(path), str(self._folder))
-        # What zip readers raise on a damaged member, and FMPy's plain Exception for an illegal path.
-        except Exception as error:
-            raise InputError(f"the FMU cannot be extracted ({error})") from None
-
-    def _instantiate(self, description: Any) -> None:
-        try:
-            slave = FMU2Slave(
-                guid=description.guid,
-                unzipDirectory=str(self._folder),
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                instanceName=self.name,
-            )
-            try:
-                slave.instantiate(callbacks=self._log.callbacks, loggingOn=True)
-            finally:
-                # PythonFMU's wrapper keeps an object for hosts without Python and releases it twice when the process
-                # ends, which now and then makes a finished run crash. Here it has no use and is given up at once.
-                with suppress(AttributeError):
-                    slave.dll.finalizePythonInterpreter()
+            calls.instantiate(self._folder, self.name)
         # FMPy raises plain Exceptions for a missing binary or a failed instantiation.
         except Exception as error:
-            raise InputError(f"the FMU cannot be instantiated: {error} {self._log}".rstrip()) from None
-        self._slave = slave
+            raise InputError(f"the FMU cannot be instantiated: {error} {calls.log}".rstrip()) from None
+        self._calls = calls
 
     def _set_values(self, variables: Any, values: Parameters, what: str) -> None:
-        setters = {"Real": "setReal", "Integer": "setInteger", "Boolean": "setBoolean", "String": "setString"}
         declared = {variable.name: variable for variable in variables}
         for name, value in values.items():
-            kind = scalar_type(declared[name])
             try:
-                self._call(partial(_set_scalar, setters[kind], declared[name].valueReference, value))
+                self._call(partial(_set_start, declared[name], value))
             except ParticipantError as error:
+                kind = declared[name].type
                 raise InputError(f"{what} '{name}' of type {kind} cannot be {value!r}: {error}") from None
 
 
@@ -268,17 +311,20 @@ def _abilities(declared: Any, ramps_itself: bool, memoryless: bool) -> Abilities
     )
 
 
-def _gives_texts(tool: str) -> bool:
-    """Whether the FMUs that `tool` made log plain texts: they never give arguments."""
-    return "PythonFMU" in tool or tool.startswith(TOOL)
+def _set_derivative(field: Field, order: int, calls: Calls) -> None:
+    calls.set_derivative(field, order)
 
 
-def _set_derivatives(references: Any, size: int, orders: Any, values: Any, slave: FMU2Slave) -> None:
-    slave.fmi2SetRealInputDerivatives(slave.component, references, size, orders, values)
+def _set_start(variable: Any, value: Any, calls: Calls) -> None:
+    calls.set_start(variable, value)
 
 
-def _set_scalar(setter: str, reference: int, value: Any, slave: FMU2Slave) -> None:
-    getattr(slave, setter)([reference], [value])
+def _extract(path: Path, folder: Path) -> None:
+    try:
+        fmpy.extract(str(path), str(folder))
+    # What zip readers raise on a damaged member, and FMPy's plain Exception for an illegal path.
+    except Exception as error:
+        raise InputError(f"the FMU cannot be extracted ({error})") from None
 
 
 def _read(path: Path) -> Any:
@@ -290,6 +336,6 @@ def _read(path: Path) -> Any:
     # FMPy raises plain Exceptions, and those of zip and XML readers.
     except Exception as error:
         raise InputError(f"FMPy cannot read it as an FMU ({error})") from None
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        raise InputError("not an FMI 2.0 co-simulation FMU")
+    if description.fmiVersion[:3] not in _CALLS or description.coSimulation is None:
+        raise InputError("not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0")
     return description

@@ -21,27 +21,11 @@ _ERROR = 3
 
 
 class FmuLog:
-    """The errors that one FMU has logged since the last `clear`, and the callbacks through which it logs them.
+    """The errors that one FMU has logged since the last `clear`."""
 
-    Parameters
-    ----------
-    formats:
-        Whether messages are printf formats, as FMI 2.0 has it. PythonFMU never gives arguments and its users' messages
-        are no formats: a percent sign in one would make the reader of formats end the process.
-    """
-
-    def __init__(self, formats: bool) -> None:
-        self._formats = formats
+    def __init__(self) -> None:
         self.errors: list[str] = []
         self.blames_input = False
-        self.callbacks = fmi2CallbackFunctions()
-        self.callbacks.logger = _LOGGER
-        self.callbacks.componentEnvironment = id(self)
-        _LOGS[id(self)] = self
-        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        if formats:
-            addLoggerProxy(byref(self.callbacks))
 
     def clear(self) -> None:
         """Forget what was logged."""
@@ -51,8 +35,6 @@ class FmuLog:
     def hear(self, status: int, category: bytes, message: bytes) -> None:
         """Take a message; errors are kept until the call that caused them returns."""
         if status >= _ERROR:
-            if not self._formats:
-                message = message.replace(b"%%", b"%")
             self.errors.append(message.decode("utf-8", errors="replace"))
             self.blames_input = category == INVALID_INPUT.encode()
 
@@ -60,8 +42,35 @@ class FmuLog:
         return "; ".join(self.errors)
 
 
-#: The log of each FMU, by the address given to it as component environment.
-_LOGS: WeakValueDictionary[int, FmuLog] = WeakValueDictionary()
+class Fmi2Log(FmuLog):
+    """The same with the callbacks through which an FMI 2.0 FMU logs.
+
+    Parameters
+    ----------
+    formats:
+        Whether messages are printf formats, as FMI 2.0 has it. PythonFMU never gives arguments and its users' messages
+        are no formats: a percent sign in one would make the reader of formats end the process.
+    """
+
+    def __init__(self, formats: bool) -> None:
+        super().__init__()
+        self._formats = formats
+        self.callbacks = fmi2CallbackFunctions()
+        self.callbacks.logger = _LOGGER
+        self.callbacks.componentEnvironment = id(self)
+        _LOGS[id(self)] = self
+        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        if formats:
+            addLoggerProxy(byref(self.callbacks))
+
+    def hear(self, status: int, category: bytes, message: bytes) -> None:
+        """See FmuLog."""
+        super().hear(status, category, message if self._formats else message.replace(b"%%", b"%"))
+
+
+#: The log of each FMI 2.0 FMU, by the address given to it as component environment.
+_LOGS: WeakValueDictionary[int, Fmi2Log] = WeakValueDictionary()
 
 
 def _route(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> Any:

@@ -1,8 +1,8 @@
-"""What an FMU declares: its fields as ports, its parameters, from the model description."""
+"""What an FMU of FMI 2.0 or 3.0 declares: its fields as ports, its parameters, from the model description."""
 
 import re
 import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from ctypes import c_double
 from itertools import product
 from math import prod
@@ -20,39 +20,57 @@ from .participant import Parameters, Port
 _INDEXED = re.compile(r"^(.*)\[(\d+(?:,\d+)*)\]$")
 #: How FMI calls an initial value that the caller may give.
 _STARTED = ("exact", "approx")
-#: What may be given for a parameter of an FMI type. (To Python a truth value is a number; to a person it is not.)
-_ACCEPTED: dict[str, Callable[[Any], bool]] = {
-    "Real": lambda value: isinstance(value, (int, float)) and not isinstance(value, bool),
-    "Integer": lambda value: isinstance(value, int) and not isinstance(value, bool) and -(2**31) <= value < 2**31,
-    "Boolean": lambda value: isinstance(value, bool),
-    "String": lambda value: isinstance(value, str) and "\0" not in value,
-}
+#: The variables that an FMU computes itself.
+_COMPUTED = ("output", "local", "calculatedParameter")
+#: The types of whole numbers, with what they can hold. An enumeration is one too.
+_WHOLE = {"Integer": (-(2**31), 2**31), "Enumeration": (-(2**31), 2**31)}
+_WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1)) for bits in (8, 16, 32, 64)}
+_WHOLE |= {f"UInt{bits}": (0, 2**bits) for bits in (8, 16, 32, 64)}
+#: The types of real numbers, and those of them that are exchanged.
+_REAL = ("Real", "Float64", "Float32")
+_EXCHANGED = ("Real", "Float64")
+
+
+def _accepts(kind: str, value: Any) -> bool:
+    """Whether `value` may be given for a parameter of an FMI type."""
+    # To Python a truth value is a number; to a person it is not.
+    if isinstance(value, bool):
+        return kind == "Boolean"
+    if kind in _WHOLE:
+        least, above = _WHOLE[kind]
+        return isinstance(value, int) and least <= value < above
+    if kind in _REAL:
+        return isinstance(value, (int, float))
+    # What is left are binaries and clocks, which a scenario has no words for.
+    return kind == "String" and isinstance(value, str) and "\0" not in value
 
 
 class Field:
-    """A port of an FMU with its value references and values, as the raw FMI calls want them."""
+    """A port of an FMU with its value references and values, as the raw FMI calls want them.
+
+    There is a reference for each of the `size` values in FMI 2.0, and one for all in FMI 3.0.
+    """
 
     def __init__(self, port: Port, references: list[int]) -> None:
         self.port = port
-        self.size = len(references)
-        self.references = (fmi2ValueReference * self.size)(*references)
+        self.size = port.size
+        # The type is the same in FMI 3.0.
+        self.references = (fmi2ValueReference * len(references))(*references)
         self.buffer = (c_double * self.size)()
         self.values = np.ctypeslib.as_array(self.buffer).reshape(port.shape)
 
 
-def scalar_type(variable: Any) -> str:
-    """The FMI 2.0 type by which a variable is set; an enumeration is set as an Integer (FMI 2.0.4, section 2.2.7)."""
-    return "Integer" if variable.type == "Enumeration" else str(variable.type)
-
-
-def check_parameters(parameters: Parameters, variables: Iterable[Any]) -> None:
+def check_parameters(parameters: Parameters, variables: Sequence[Any]) -> None:
     """InputError for a parameter that the FMU does not have, or that cannot have the value given."""
     declared = {
         variable.name: variable
         for variable in variables
         if variable.causality == "parameter" and variable.variability != "constant"
     }
+    structural = {variable.name for variable in variables if variable.causality == "structuralParameter"}
     for name, value in parameters.items():
+        if name in structural:
+            raise InputError(f"'{name}' is a structural parameter, which keeps its start value here; remove it")
         if name not in declared:
             raise InputError(f"the FMU has no parameter '{name}'{did_you_mean(name, declared)}")
         _check_type(f"parameter '{name}'", declared[name], value)
@@ -66,7 +84,7 @@ def check_start(start: Parameters, variables: Iterable[Any]) -> None:
     declared = {
         variable.name: variable
         for variable in variables
-        if variable.causality == "input" or (variable.causality != "parameter" and variable.initial in _STARTED)
+        if variable.causality == "input" or (variable.causality in _COMPUTED and variable.initial in _STARTED)
     }
     for name, value in start.items():
         if name not in declared:
@@ -75,9 +93,8 @@ def check_start(start: Parameters, variables: Iterable[Any]) -> None:
 
 
 def _check_type(what: str, variable: Any, value: Any) -> None:
-    kind = scalar_type(variable)
-    if not _ACCEPTED[kind](value):
-        raise InputError(f"{what} of type {kind} cannot be {value!r}")
+    if not _accepts(variable.type, value):
+        raise InputError(f"{what} of type {variable.type} cannot be {value!r}")
 
 
 def declares_ramps(variables: Iterable[Any]) -> bool:
@@ -94,16 +111,18 @@ def ramps_itself(variables: Iterable[Any], parameters: Parameters) -> bool:
 
 
 def real_fields(path: Path, variables: Iterable[Any], parameters: Parameters) -> tuple[list[Field], list[Field]]:
-    """The Real inputs and outputs of the FMU at `path`, scalars `x[1]`, `x[2]`, … taken together as one field.
+    """The Real inputs and outputs of the FMU at `path` (FMI 3.0: Float64, arrays among them).
 
-    `variables` are those of FMPy's model description. InputError if the indices of a field do not fill an array.
+    Scalars `x[1]`, `x[2]`, … are taken together as one field. `variables` are those of FMPy's model description; a
+    dimension given by a structural parameter has that one's start value. InputError if the indices of a field do not
+    fill an array.
     """
     groups: dict[tuple[str, str], list[tuple[tuple[int, ...], Any]]] = {}
     values: dict[str, Any] = {}
     for variable in variables:
         values[variable.name] = parameters.get(variable.name, variable.start)
-        if variable.causality in ("input", "output") and variable.type == "Real":
-            match = _INDEXED.match(variable.name)
+        if variable.causality in ("input", "output") and variable.type in _EXCHANGED:
+            match = None if variable.shape else _INDEXED.match(variable.name)
             name = match[1] if match else variable.name
             index = tuple(map(int, match[2].split(","))) if match else ()
             groups.setdefault((variable.causality, name), []).append((index, variable))
@@ -116,6 +135,8 @@ def real_fields(path: Path, variables: Iterable[Any], parameters: Parameters) ->
         # Counted first: a wild index is not to make a list of its size.
         if len(indices) != prod(shape) or indices != list(product(*(range(1, count + 1) for count in shape))):
             raise InputError(f"the FMU's variables {name}[…] do not fill an array of shape {shape} with indices from 1")
+        # An array of FMI 3.0 is one variable, without an index.
+        shape = shape or members[0][1].shape
         extra = annotations.get(name, {})
         port = Port(
             name,
@@ -133,24 +154,24 @@ def real_fields(path: Path, variables: Iterable[Any], parameters: Parameters) ->
 
 def is_memoryless(path: Path) -> bool:
     """Whether the FMU says that its outputs follow its inputs whatever was before; only this project's do."""
-    tool = _tool(path)
-    unit = None if tool is None else tool.find("Unit")
+    own = _own_annotations(path)
+    unit = None if own is None else own.find("Unit")
     return unit is not None and unit.get("memoryless") == "true"
 
 
 def _annotations(path: Path) -> dict[str, dict[str, str]]:
     """What this project's FMUs say of their fields beyond FMI: attributes by name; empty for foreign FMUs."""
-    tool = _tool(path)
-    return {} if tool is None else {field.get("name"): dict(field.attrib) for field in tool.iter("Field")}
+    own = _own_annotations(path)
+    return {} if own is None else {field.get("name"): dict(field.attrib) for field in own.iter("Field")}
 
 
-def _tool(path: Path) -> Any:
+def _own_annotations(path: Path) -> Any:
     """This project's element of the FMU's annotations; None in foreign FMUs."""
     with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as text:
-        # The annotations come before the variables; nothing after them is parsed.
-        for _, element in etree.iterparse(text, tag=("Tool", "ScalarVariable")):
+        # In FMI 2.0 the annotations come before the many variables; nothing after them is parsed.
+        for _, element in etree.iterparse(text, tag=("Tool", "Annotation", "ScalarVariable")):
             if element.tag == "ScalarVariable":
                 return None
-            if element.get("name") == TOOL:
+            if TOOL in (element.get("name"), element.get("type")):
                 return element
     return None

@@ -456,6 +456,12 @@ _FMI3 = """<?xml version="1.0"?>
 </ModelVariables><ModelStructure/></fmiModelDescription>"""
 
 
+_FMI1 = """<?xml version="1.0"?>
+<fmiModelDescription fmiVersion="1.0" modelName="m" modelIdentifier="m" guid="g" numberOfContinuousStates="0"
+ numberOfEventIndicators="0"><ModelVariables/><Implementation><CoSimulation_StandAlone><Capabilities/>
+</CoSimulation_StandAlone></Implementation></fmiModelDescription>"""
+
+
 def _file(kind: str, source: Path, folder: Path) -> Path:
     path = folder / "guest.fmu"
     if kind == "missing":
@@ -475,7 +481,8 @@ def _file(kind: str, source: Path, folder: Path) -> Path:
         return _make("Moody", _MOODY, folder)
     else:
         change, drop = {
-            "FMI 3": (lambda text: _FMI3, "nothing"),
+            "FMI 1": (lambda text: _FMI1, "nothing"),
+            "FMI 3 without binary": (lambda text: _FMI3, "nothing"),
             "model exchange": (lambda text: text.replace("CoSimulation", "ModelExchange"), "nothing"),
             "no XML": (lambda text: text[:300], "nothing"),
             "no binary": (lambda text: text, "binaries/"),
@@ -494,7 +501,8 @@ def _file(kind: str, source: Path, folder: Path) -> Path:
         ("cut", "cannot read it as an FMU"),
         ("no description", "cannot read it as an FMU"),
         ("no XML", "cannot read it as an FMU"),
-        ("FMI 3", "not an FMI 2.0 co-simulation FMU"),
+        ("FMI 1", "not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0"),
+        ("FMI 3 without binary", r"cannot be instantiated: Cannot find shared library .*x86_64-linux/m\.so"),
         ("model exchange", "not an FMI 2.0 co-simulation FMU"),
         ("damaged", "cannot be extracted .*CRC|cannot be extracted .*decompress"),
         ("no binary", "cannot be instantiated: Cannot find shared library"),

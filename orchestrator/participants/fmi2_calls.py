@@ -1,0 +1,106 @@
+"""The calls of an FMI 2.0 co-simulation FMU, through FMPy."""
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from fmpy.fmi2 import FMU2Slave, fmi2False, fmi2Integer
+
+from ...fmus.model_description import TOOL
+from .fmu_log import Fmi2Log
+from .fmu_variables import Field
+
+
+class Fmi2Calls:
+    """See Calls."""
+
+    def __init__(self, description: Any) -> None:
+        self._description = description
+        self._slave: Any = None
+        self.log = Fmi2Log(formats=not _gives_texts(description.generationTool or ""))
+        self.takes_derivatives = bool(description.coSimulation.canInterpolateInputs)
+
+    def instantiate(self, folder: Path, name: str) -> None:
+        """See Calls."""
+        slave = FMU2Slave(
+            guid=self._description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=self._description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        try:
+            slave.instantiate(callbacks=self.log.callbacks, loggingOn=True)
+        finally:
+            # PythonFMU's wrapper keeps an object for hosts without Python and releases it twice when the process
+            # ends, which now and then makes a finished run crash. Here it has no use and is given up at once.
+            with suppress(AttributeError):
+                slave.dll.finalizePythonInterpreter()
+        self._slave = slave
+
+    def free_instance(self) -> None:
+        """See Calls."""
+        self._slave.freeInstance()
+
+    def enter_initialization_mode(self) -> None:
+        """See Calls."""
+        self._slave.setupExperiment(startTime=0.0)
+        self._slave.enterInitializationMode()
+
+    def exit_initialization_mode(self) -> None:
+        """See Calls."""
+        self._slave.exitInitializationMode()
+
+    def terminate(self) -> None:
+        """See Calls."""
+        self._slave.terminate()
+
+    def set(self, field: Field) -> None:
+        """See Calls."""
+        self._slave.fmi2SetReal(self._slave.component, field.references, field.size, field.buffer)
+
+    def get(self, field: Field) -> None:
+        """See Calls."""
+        self._slave.fmi2GetReal(self._slave.component, field.references, field.size, field.buffer)
+
+    def set_derivative(self, field: Field, order: int) -> None:
+        """See Calls (FMI 2.0.4, section 4.2.1)."""
+        orders = (fmi2Integer * field.size)(*[order] * field.size)
+        self._slave.fmi2SetRealInputDerivatives(
+            self._slave.component, field.references, field.size, orders, field.buffer
+        )
+
+    def set_start(self, variable: Any, value: Any) -> None:
+        """See Calls."""
+        # An enumeration is set as an Integer (FMI 2.0.4, section 2.2.7).
+        kind = "Integer" if variable.type == "Enumeration" else variable.type
+        getattr(self._slave, f"set{kind}")([variable.valueReference], [value])
+
+    def step(self, time: float, size: float) -> None:
+        """See Calls."""
+        # False: the master may go back to before the step.
+        self._slave.doStep(time, size, fmi2False)
+
+    def save(self) -> Any:
+        """See Calls."""
+        return self._slave.getFMUstate()
+
+    def restore(self, state: Any) -> None:
+        """See Calls."""
+        self._slave.setFMUstate(state)
+
+    def free(self, state: Any) -> None:
+        """See Calls."""
+        self._slave.freeFMUstate(state)
+
+    def pack(self, state: Any) -> bytes:
+        """See Calls."""
+        return bytes(self._slave.serializeFMUstate(state))
+
+    def unpack(self, data: bytes) -> Any:
+        """See Calls."""
+        return self._slave.deSerializeFMUstate(data)
+
+
+def _gives_texts(tool: str) -> bool:
+    """Whether the FMUs that `tool` made log plain texts: they never give arguments."""
+    return "PythonFMU" in tool or tool.startswith(TOOL)

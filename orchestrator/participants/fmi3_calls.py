@@ -1,0 +1,105 @@
+"""The calls of an FMI 3.0 co-simulation FMU, through FMPy. An array crosses in one piece, by one value reference.
+
+Event mode and early return are not asked for: the FMU handles its events inside of a step (FMI 3.0, section 4.2.1).
+"""
+
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from fmpy.fmi3 import FMU3Slave
+
+from ..errors import ParticipantError
+from .fmu_log import FmuLog
+from .fmu_variables import Field
+
+
+class Fmi3Calls:
+    """See Calls."""
+
+    #: FMI 3.0 has intermediate updates in place of input derivatives; they are not used.
+    takes_derivatives = False
+
+    def __init__(self, description: Any) -> None:
+        self._description = description
+        self._slave: Any = None
+        self.log = FmuLog()
+
+    def instantiate(self, folder: Path, name: str) -> None:
+        """See Calls."""
+        slave = FMU3Slave(
+            guid=self._description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=self._description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        slave.instantiate(loggingOn=True, logMessage=self._hear)
+        self._slave = slave
+
+    def free_instance(self) -> None:
+        """See Calls."""
+        self._slave.freeInstance()
+
+    def enter_initialization_mode(self) -> None:
+        """See Calls."""
+        self._slave.enterInitializationMode(startTime=0.0)
+
+    def exit_initialization_mode(self) -> None:
+        """See Calls."""
+        self._slave.exitInitializationMode()
+
+    def terminate(self) -> None:
+        """See Calls."""
+        self._slave.terminate()
+
+    def set(self, field: Field) -> None:
+        """See Calls."""
+        self._slave.fmi3SetFloat64(
+            self._slave.component, field.references, len(field.references), field.buffer, field.size
+        )
+
+    def get(self, field: Field) -> None:
+        """See Calls."""
+        self._slave.fmi3GetFloat64(
+            self._slave.component, field.references, len(field.references), field.buffer, field.size
+        )
+
+    def set_derivative(self, field: Field, order: int) -> None:
+        """See Calls."""
+        raise ParticipantError("an FMI 3.0 FMU takes no input derivatives")
+
+    def set_start(self, variable: Any, value: Any) -> None:
+        """See Calls."""
+        # An enumeration is set as an Int64 (FMI 3.0, section 2.4.4).
+        kind = "Int64" if variable.type == "Enumeration" else variable.type
+        getattr(self._slave, f"set{kind}")([variable.valueReference], [value] * prod(variable.shape))
+
+    def step(self, time: float, size: float) -> None:
+        """See Calls."""
+        # False: the master may go back to before the step.
+        _, terminate, _, _ = self._slave.doStep(time, size, False)
+        if terminate:
+            raise ParticipantError("it asks for the end of the simulation (terminateSimulation)")
+
+    def save(self) -> Any:
+        """See Calls."""
+        return self._slave.getFMUState()
+
+    def restore(self, state: Any) -> None:
+        """See Calls."""
+        self._slave.setFMUState(state)
+
+    def free(self, state: Any) -> None:
+        """See Calls."""
+        self._slave.freeFMUState(state)
+
+    def pack(self, state: Any) -> bytes:
+        """See Calls."""
+        return bytes(self._slave.serializeFMUState(state))
+
+    def unpack(self, data: bytes) -> Any:
+        """See Calls."""
+        return self._slave.deserializeFMUState(data)
+
+    def _hear(self, _environment: Any, status: int, category: bytes | None, message: bytes | None) -> None:
+        self.log.hear(status, category or b"", message or b"")
