@@ -43,7 +43,9 @@ _OWN = ElementMaker(namespace=TOOL, nsmap={None: TOOL})
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
-def write_ssp(system: System, path: Path, annotation: str | None = None, extra: Mapping[str, bytes] | None = None) -> Path:
+def write_ssp(
+    system: System, path: Path, annotation: str | None = None, extra: Mapping[str, bytes] | None = None
+) -> Path:
     """Write `system` to the file `path` and return it.
 
     `annotation` is text that belongs to the whole system, and `extra` are files, by their names in the folder `extra`.
@@ -83,8 +85,7 @@ def _structure(system: System, annotation: str | None) -> Any:
             *_connections(system),
         ),
     )
-    units = _units({name: unit for item in system.components for name, unit in _declared(item, _shown(system, item))})
-    root.extend(units)
+    root.extend(_units(_SSD, [(component, _shown(system, component)) for component in system.components]))
     step = _HINT.Algorithm(_HINT.FixedStepAlgorithm({"baseStepSize": repr(system.step_s)}))
     hint = _SSD.Annotations(_SSC.Annotation({"type": "com.opensimulationplatform"}, step))
     root.append(_SSD.DefaultExperiment({"startTime": "0.0", "stopTime": repr(system.stop_s)}, hint))
@@ -104,7 +105,7 @@ def _component(system: System, component: Component) -> Any:
     )
     kinds = {"input": system.linked_inputs(component), "output": _visible_outputs(system, component)}
     connectors = [
-        _SSD.Connector({"name": scalar, "kind": kind}, _SSC.Real(_measured(component.unit_of(name, shape))))
+        _SSD.Connector({"name": scalar, "kind": kind}, _SSC.Real(_measured(component, component.unit_of(name, shape))))
         for kind, fields in kinds.items()
         for name, shape in fields.items()
         for scalar in scalar_names(name, shape)
@@ -133,48 +134,48 @@ def _connections(system: System) -> Iterator[Any]:
         for output, target in link.scalars():
             ends = {"startElement": link.source, "startConnector": output}
             ends |= {"endElement": link.target, "endConnector": target}
-            if link.is_plain:
+            if link.law is None:
                 elements.append(_SSD.Connection(ends))
                 continue
             # What is transformed by hand is not to be converted once more by units of measure.
-            law = _SSC.LinearTransformation({"factor": repr(link.factor), "offset": repr(link.offset)})
+            law = _SSC.LinearTransformation({"factor": repr(link.law[0]), "offset": repr(link.law[1])})
             elements.append(_SSD.Connection(ends | {"suppressUnitConversion": "true"}, law))
     if elements:
         yield _SSD.Connections(*elements)
 
 
-def _measured(unit: str | None) -> dict[str, str]:
-    return {} if unit is None else {"unit": unit}
-
-
 # --- units of measure -------------------------------------------------------------------------------------------------
 
 
-def _shown(system: System, component: Component) -> set[str]:
+def _shown(system: System, component: Component) -> set[str | None]:
     """Units of the connectors of `component`."""
     fields = system.linked_inputs(component) | _visible_outputs(system, component)
-    found = (component.unit_of(name, shape) for name, shape in fields.items())
-    return {unit for unit in found if unit is not None}
+    return {component.unit_of(name, shape) for name, shape in fields.items()}
 
 
-def _declared(component: Component, names: Iterable[str]) -> Iterator[tuple[str, Any]]:
-    """FMPy's definitions of the units `names`, None for those that the FMU does not define."""
-    definitions = {unit.name: unit.baseUnit for unit in component.description.unitDefinitions}
-    for name in sorted(names):
-        yield name, definitions.get(name)
+def _units(maker: Any, used: Iterable[tuple[Component, set[str | None]]]) -> list[Any]:
+    """The element of all unit definitions, in the namespace of `maker`; none if there is nothing to define."""
+    bases: dict[str, dict[str, str]] = {}
+    for component, names in used:
+        for name in names & component.units.keys():
+            base = _base(component.units[str(name)])
+            if bases.setdefault(str(name), base) != base:
+                raise InvalidInput(
+                    f"the FMU {component.fmu.name} of '{component.name}' defines the unit of measure '{name}' "
+                    "otherwise than another FMU; a package has one definition"
+                )
+    elements = [_SSC.Unit({"name": name}, _SSC.BaseUnit(base)) for name, base in sorted(bases.items())]
+    return [maker.Units(*elements)] if elements else []
 
 
-def _units(definitions: Mapping[str, Any]) -> list[Any]:
-    """The element of all unit definitions; none if there is nothing to define.
+def _base(unit: Any) -> dict[str, str]:
+    exponents = {key: str(getattr(unit, key)) for key in _BASE_UNITS if getattr(unit, key)}
+    return exponents | {"factor": repr(float(unit.factor)), "offset": repr(float(unit.offset))}
 
-    A unit without a definition is given the one of a pure number, as the schema wants one.
-    """
-    elements = []
-    for name, base in sorted(definitions.items()):
-        exponents = {} if base is None else {key: str(getattr(base, key)) for key in _BASE_UNITS if getattr(base, key)}
-        scale = {} if base is None else {"factor": repr(float(base.factor)), "offset": repr(float(base.offset))}
-        elements.append(_SSC.Unit({"name": name}, _SSC.BaseUnit(exponents | scale)))
-    return [_SSD.Units(*elements)] if elements else []
+
+def _measured(component: Component, unit: str | None) -> dict[str, str]:
+    """The attribute for a unit that the FMU defines; one that it only names stays with the FMU."""
+    return {"unit": unit} if unit in component.units else {}
 
 
 # --- parameters -------------------------------------------------------------------------------------------------------
@@ -186,10 +187,7 @@ def _parameter_set(component: Component) -> Any:
         {"version": "1.0", "name": component.name},
         _SSV.Parameters(*(_SSV.Parameter({"name": value.name}, _typed(component, value)) for value in values)),
     )
-    units = dict(_declared(component, {value.unit for value in values if value.unit is not None}))
-    for element in _units(units):
-        element.tag = f"{{{NAMESPACES['ssv']}}}Units"
-        root.append(element)
+    root.extend(_units(_SSV, [(component, {value.unit for value in values if value.fmi_type == "Real"})]))
     return root
 
 
@@ -199,7 +197,9 @@ def _typed(component: Component, value: Value) -> Any:
         items = component.variables[value.name].declaredType.items
         named = {str(item.value): item.name for item in items}
         if value.text not in named:
-            raise InvalidInput(f"'{value.name}' of '{component.name}' has no item {value.text} (known: {', '.join(named)})")
+            raise InvalidInput(
+                f"'{value.name}' of '{component.name}' has no item {value.text} (known: {', '.join(named)})"
+            )
         return _SSV.Enumeration({"value": named[value.text]})
-    unit = _measured(value.unit) if value.fmi_type == "Real" else {}
+    unit = _measured(component, value.unit) if value.fmi_type == "Real" else {}
     return _SSV(value.fmi_type, {"value": value.text} | unit)

@@ -48,6 +48,12 @@ class Component:
         """FMPy's scalar variables by name."""
         return {variable.name: variable for variable in self.description.modelVariables}
 
+    @cached_property
+    def units(self) -> dict[str, Any]:
+        """FMPy's base units of the units of measure that the FMU defines, by name."""
+        definitions = self.description.unitDefinitions
+        return {unit.name: unit.baseUnit for unit in definitions if unit.baseUnit is not None}
+
     def unit_of(self, name: str, shape: Shape) -> str | None:
         """Unit of measure of a field, if the FMU declares one."""
         unit: str | None = self.variables[next(scalar_names(name, shape))].unit
@@ -57,27 +63,23 @@ class Component:
         """All that is given, in the words of FMI; InvalidInput for a variable that the FMU does not have."""
         for name, value in self.given.items():
             if name not in self.variables:
-                raise InvalidInput(f"the FMU {self.fmu.name} of '{self.name}' has no variable '{name}'; remove its value")
+                raise InvalidInput(
+                    f"the FMU {self.fmu.name} of '{self.name}' has no variable '{name}'; remove its value"
+                )
             variable = self.variables[name]
             yield Value(name, variable.type, _text(variable, value), variable.unit)
 
 
 @dataclass(frozen=True)
 class Link:
-    """An output that feeds an input, both of `shape`, as factor · value + offset."""
+    """An output that feeds an input, both of `shape`: as it is, or as factor · value + offset by `law`."""
 
     source: str
     output: str
     target: str
     input: str
     shape: Shape = ()
-    factor: float = 1.0
-    offset: float = 0.0
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether the values arrive as they are."""
-        return (self.factor, self.offset) == (1.0, 0.0)
+    law: tuple[float, float] | None = None
 
     def scalars(self) -> Iterator[tuple[str, str]]:
         """Output and input, scalar by scalar."""
@@ -127,7 +129,7 @@ class System:
     def require_plain_links(self, tool: str) -> None:
         """InvalidInput if a link transforms what it carries, which `tool` does not do for fields."""
         for link in self.links:
-            if not link.is_plain:
+            if link.law is not None:
                 raise InvalidInput(
                     f"the connection {link} transforms its values, which cannot be written for {tool}; "
                     "give the source the unit of the target"

@@ -102,9 +102,9 @@ class Exchange:
                 continue
             with blaming(unit):
                 if ramps:
-                    participant.ramp(link.target.name, self._ramp(unit, link.source))
+                    participant.ramp(link.target.name, link.ramped(self._ramp(unit, link.source)))
                 else:
-                    participant.set(link.target.name, self._at_end(link.source))
+                    participant.set(link.target.name, link.carried(self._at_end(link.source)))
         if initially:
             self._mark(unit)
 

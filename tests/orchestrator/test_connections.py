@@ -1,9 +1,14 @@
 """If these fail, a unit silently runs on another's numbers, or on none."""
 
+from typing import Any
+
+import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.coupling.connections import Connection, End, connect, initial_order
+from cardiac_cosim.orchestrator.coupling.exchange import Inputs
 from cardiac_cosim.orchestrator.errors import InputError
 from cardiac_cosim.orchestrator.participants.native import Mesh, NativeParticipant
+from cardiac_cosim.orchestrator.participants.participant import Ramp
 
 
 def _texts(connections: tuple[Connection, ...]) -> set[str]:
@@ -85,7 +90,17 @@ def test_an_input_that_does_not_matter_is_left_alone_unless_written(fake, port) 
         (["alpha.potential -> b.p", "alpha.potential -> b.p"], ["the input b.p has more than one source"]),
         (["alpha.field -> b.u"], ["'alpha.field -> b.u'", "shapes differ, (3,) -> ()", "same mesh"]),
         (["alpha.field -> b.v"], ["shapes differ, (3,) -> (3, 1)"]),
-        (["alpha.potential -> b.p"], ["'alpha.potential -> b.p'", "units of measure differ, mV -> V", "no conversion"]),
+        (
+            ["alpha.potential -> b.p"],
+            [
+                "'alpha.potential -> b.p'",
+                "units of measure differ, mV -> V",
+                "write the conversion, 'alpha.potential * <factor> -> b.p'",
+            ],
+        ),
+        (["alpha.potential * -> b.p"], ["cannot be read", "unit.output * 0.001 + 273 -> unit.input"]),
+        (["alpha.potential * 1e -> b.p"], ["cannot be read"]),
+        (["alpha.potential + 1 * 2 -> b.p"], ["cannot be read"]),
     ],
 )
 def test_a_wrong_connection_is_named_with_its_remedy(fake, port, written: list[str], words: list[str]) -> None:
@@ -105,6 +120,57 @@ def test_a_wrong_connection_is_named_with_its_remedy(fake, port, written: list[s
 def test_a_unit_of_measure_that_is_not_declared_fits_all(fake, port) -> None:
     units = {"a": fake("a", outputs=[port("x", unit="mV")]), "b": fake("b", [port("x", unit=None)])}
     assert _texts(connect(units, [])) == {"a.x -> b.x"}
+
+
+@pytest.mark.parametrize(
+    ("written", "factor", "offset"),
+    [
+        ("* 0.001", 0.001, 0.0),
+        ("* -2.5e-3 + 273.15", -2.5e-3, 273.15),
+        ("* 2 - 1", 2.0, -1.0),
+        ("- 1", 1.0, -1.0),
+        ("* 1 + -.5", 1.0, -0.5),
+        # That nothing is to be done about units that differ can be said as well.
+        ("* 1", 1.0, 0.0),
+    ],
+)
+def test_a_law_on_the_way(fake, port, written: str, factor: float, offset: float) -> None:
+    units = {"a": fake("a", outputs=[port("x", unit="mV")]), "b": fake("b", [port("u", unit="V")])}
+    (link,) = connect(units, [f"a.x {written} -> b.u"])
+    values = np.array([1.0, -3.0])
+    np.testing.assert_array_equal(link.carried(values), factor * values + offset)
+    ramp = link.ramped(Ramp(values, 2.0 * values, 3.0 * values))
+    np.testing.assert_array_equal(ramp.end, factor * 2.0 * values + offset)
+    np.testing.assert_array_equal(ramp.curvature, factor * 3.0 * values)
+    # What is printed can be written.
+    assert connect(units, [str(link)]) == (link,)
+
+
+def test_names_of_foreign_variables_are_no_laws(fake, port) -> None:
+    units = {"a": fake("a", outputs=[port("x*2+1"), port("y-1")]), "b": fake("b", [port("u"), port("v")])}
+    links = connect(units, ["a.x*2+1 -> b.u", "a.y-1 -> b.v"])
+    assert _texts(links) == {"a.x*2+1 -> b.u", "a.y-1 -> b.v"}
+    assert all(link.law is None for link in links)
+
+
+@pytest.mark.parametrize("ramps", [False, True])
+def test_a_law_is_applied_to_every_value_that_is_exchanged(fake, port, master, ramps: bool) -> None:
+    def counting(inputs: Any, outputs: Any, time: float, size: float) -> dict[str, Any]:
+        return {"x": outputs["x"] + 1.0}
+
+    units = {
+        "a": fake("a", outputs=[port("x")], begins={"x": 1.0}, law=counting),
+        "b": fake("b", [port("u")], law=lambda *_: {}, ramps=ramps),
+    }
+    master(units, 2, ["a.x * 10 + 5 -> b.u"], inputs=Inputs(linear=ramps)).run([])
+    given = [call[3:] for call in units["b"].calls if call[1] in ("set", "ramp")]
+    assert given == [(15.0,), *([(15.0, 25.0), (25.0, 35.0)] if ramps else [(25.0,), (35.0,)])]
+
+
+def test_nothing_is_connected_by_name_if_that_is_not_wanted(fake, port) -> None:
+    units = {"a": fake("a", outputs=[port("x"), port("y")]), "b": fake("b", [port("x"), port("y")])}
+    assert _texts(connect(units, ["a.y -> b.x"], by_name=False)) == {"a.y -> b.x"}
+    assert _texts(connect(units, ["a.y -> b.x"])) == {"a.y -> b.x", "a.y -> b.y"}
 
 
 def test_connections_by_name_are_checked_like_written_ones(fake, port) -> None:

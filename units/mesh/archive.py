@@ -1,4 +1,4 @@
-"""A mesh as one NumPy archive: what an FMU carries, read without any mesh library."""
+"""A mesh as one NumPy archive: what an FMU or a system package carries, read without any mesh library."""
 
 from pathlib import Path
 

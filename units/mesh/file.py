@@ -1,5 +1,6 @@
-"""Meshes on disk: any format meshio reads, boundaries as physical groups."""
+"""Meshes on disk: any format meshio reads, boundaries as physical groups; and this project's own archives."""
 
+import zipfile
 from contextlib import redirect_stdout
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import meshio
 import numpy as np
 
 from ..errors import InvalidInput
+from .archive import unpack_mesh
 from .simplices import Mesh
 
 _TAG = "gmsh:physical"
@@ -14,6 +16,8 @@ _TAG = "gmsh:physical"
 
 def read_mesh(path: Path) -> Mesh:
     """Read tetrahedra and their named boundary triangles; node and element order are the file's.
+
+    A NumPy archive (.npz) that `pack_mesh` wrote may hold a mesh of any dimension.
 
     Raises
     ------
@@ -23,6 +27,12 @@ def read_mesh(path: Path) -> Mesh:
     """
     if not path.is_file():
         raise InvalidInput(f"{path}: no such mesh file")
+    if path.suffix == ".npz":
+        try:
+            return unpack_mesh(path)
+        # What NumPy raises of an archive that is damaged, or none; and what is wrong with the mesh in it.
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+            raise InvalidInput(f"{path}: holds no mesh of this project ({error}); write it anew") from None
     try:
         # meshio tries the formats of an ending one by one, and prints what each of them says.
         with redirect_stdout(None):

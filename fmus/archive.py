@@ -1,0 +1,31 @@
+"""Archives that are the same bytes whenever the content is the same, and that nobody ever sees half written."""
+
+import uuid
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+#: The date of every member, so that the same content makes the same bytes.
+_EPOCH = (2020, 1, 1, 0, 0, 0)
+#: Permissions of every member; without them Unix unzippers extract files that nobody may read.
+_READABLE = 0o100644 << 16
+
+
+def add(archive: zipfile.ZipFile, name: str, content: bytes, compression: int = zipfile.ZIP_DEFLATED) -> None:
+    """Add the member `name`."""
+    member = zipfile.ZipInfo(name, _EPOCH)
+    member.external_attr = _READABLE
+    archive.writestr(member, content, compression)
+
+
+@contextmanager
+def put_in_place(destination: Path) -> Iterator[Path]:
+    """A path to write a file to, which takes the place of `destination` when it is complete."""
+    destination.parent.mkdir(parents=True, exist_ok=True)
+    part = destination.with_name(f"{destination.stem}-{uuid.uuid4().hex}.part")
+    try:
+        yield part
+        part.replace(destination)
+    finally:
+        part.unlink(missing_ok=True)
