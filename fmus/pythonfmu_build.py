@@ -2,6 +2,7 @@
 
 import sys
 import zipfile
+from importlib.metadata import version
 from pathlib import Path
 
 from pythonfmu.builder import FmuBuilder
@@ -11,7 +12,17 @@ from .instance import MESH_FILE
 
 _STUB = '''"""The {unit} unit as an FMU: loads the packaged code under a name that is its own."""
 
-from {package}.fmus.pythonfmu_slave import PythonFmuSlave
+import sys
+
+import pythonfmu
+
+try:
+    from {package}.fmus.pythonfmu_slave import Fmi2Status, PythonFmuSlave
+except ModuleNotFoundError as error:
+    raise ImportError(
+        "this FMU needs the Python package '" + str(error.name).partition(".")[0] + "', which the Python "
+        + sys.version.split()[0] + " at " + sys.prefix + " does not have; install numpy, scipy, scikit-fem and meshio"
+    ) from None
 
 
 class {name}(PythonFmuSlave):
@@ -19,6 +30,13 @@ class {name}(PythonFmuSlave):
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
+        known = getattr(pythonfmu, "__version__", "unknown")
+        if known != "{version}":
+            self.log(
+                "this FMU is made for pythonfmu {version}, and its host has loaded pythonfmu " + known + " from "
+                + str(pythonfmu.__file__) + "; should it fail, run it in a host that has not",
+                Fmi2Status.warning,
+            )
 '''
 
 
@@ -30,7 +48,8 @@ def pythonfmu_archive(unit: type[Unit], key: str, package: str, code: dict[str, 
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     script = work / f"{stub}.py"
-    script.write_text(_STUB.format(unit=unit.name, package=package, name=unit.__name__ + key[:16]))
+    names = {"unit": unit.name, "package": package, "name": unit.__name__ + key[:16], "version": version("pythonfmu")}
+    script.write_text(_STUB.format(**names))
     path_before, modules_before = list(sys.path), set(sys.modules)
     try:
         plain = FmuBuilder.build_FMU(

@@ -1,0 +1,131 @@
+"""If these failed, our FMUs would work in Python only: a simulator written in C could not load them, or not say why."""
+
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from cardiac_cosim.fmus.build import build_fmu
+from cardiac_cosim.orchestrator.run import checked_mesh, run_scenario
+from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.units.registry import UNITS
+
+_HERE = Path(__file__).parent
+_CELL = _HERE.parents[2] / "scenarios" / "cell.yaml"
+_STEPS = 60
+_COLUMNS = {"potential_max": "potential_cell_mV", "active_stress_mean": "active_stress_mean_kPa"}
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="session")
+def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The importer, compiled against the headers of the standard."""
+    program = tmp_path_factory.mktemp("host") / "host"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    command = ["cc", "-O1", "-Wall", f"-I{headers}"]
+    subprocess.run([*command, str(_HERE / "host.c"), "-o", str(program), "-ldl"], check=True)
+    libraries = subprocess.run(["ldd", str(program)], capture_output=True, text=True, check=True).stdout
+    assert "python" not in libraries
+    return program
+
+
+@pytest.fixture(scope="session")
+def cell(binary: str, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """The FMUs of one cell, extracted, in the order in which they step."""
+    folder = tmp_path_factory.mktemp(binary)
+    scenario = load_scenario(_CELL)
+    mesh = checked_mesh(scenario, _CELL.parent)
+    assert mesh is not None
+    extracted = []
+    for entry in scenario.units.values():
+        unit = UNITS[str(entry.unit)]
+        fmu = build_fmu(unit, mesh, folder / f"{unit.name}.fmu")
+        extracted.append(Path(fmpy.extract(str(fmu), str(folder / unit.name))))
+    return extracted
+
+
+@pytest.fixture
+def run(host: Path, cell: list[Path]) -> Run:
+    """Let the host couple the cell's FMUs, in an environment with nothing of Python's but what is given."""
+
+    def call(steps: int, *words: str, **environment: str) -> "subprocess.CompletedProcess[str]":
+        parameter = "electrophysiology.time_scale_reduction=0"
+        command = [str(host), "0.001", str(steps), *map(str, cell), "--set", parameter, *words]
+        return subprocess.run(
+            command, capture_output=True, text=True, timeout=60, env={"PATH": os.environ["PATH"]} | environment
+        )
+
+    return call
+
+
+def _shared_python() -> str:
+    get = sysconfig.get_config_var
+    folders = [get("LIBDIR"), os.path.join(sys.base_prefix, "lib"), get("LIBPL")]
+    paths = [Path(folder) / get("INSTSONAME") for folder in folders if folder]
+    return str(next(path for path in paths if path.is_file()))
+
+
+def _ways(binary: str) -> dict[str, str]:
+    """What a host without Python needs to be given: for ours a word, for pythonfmu's the library and the packages."""
+    if binary == "own":
+        return {"COSIM_PYTHON": sys.executable}
+    return {"LD_PRELOAD": _shared_python(), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+
+
+def test_a_program_in_c_makes_a_cell_beat_as_we_do(run: Run, binary: str, tmp_path: Path) -> None:
+    printed = [word for name in _COLUMNS for word in ("--print", name)]
+    done = run(_STEPS, *printed, **_ways(binary))
+    # Of hosts that are not Python, pythonfmu's binary crashes every other one when all is done and the process ends: it
+    # releases an object twice. Nothing is lost by that: all lines are there.
+    assert done.returncode in ({0} if binary == "own" else {0, -signal.SIGSEGV})
+    assert done.stderr == ""
+    theirs = np.array([[float(number) for number in line.split()] for line in done.stdout.splitlines()])
+
+    scenario = load_scenario(_CELL, [f"run.stop_ms={_STEPS}", "run.participants=native"])
+    run_scenario(scenario, _CELL.parent, tmp_path)
+    own = np.genfromtxt(tmp_path / "timeseries.csv", delimiter=",", names=True)
+    assert len(theirs) == len(own)
+    assert np.ptp(own["potential_cell_mV"]) > 20.0
+    # The probe interpolates between nodes that have all one potential: that rounds.
+    tolerances = {"potential_max": 1e-12, "active_stress_mean": 0.0}
+    for place, (name, column) in enumerate(_COLUMNS.items()):
+        np.testing.assert_allclose(theirs[:, place], own[column], rtol=tolerances[name], atol=0, err_msg=name)
+
+
+def test_without_python_our_wrapper_says_what_it_looks_for(run: Run, binary: str) -> None:
+    if binary == "pythonfmu":
+        done = run(1)
+        assert done.returncode == 1
+        assert done.stderr.endswith("undefined symbol: _Py_NoneStruct\n")
+        return
+    done = run(1, COSIM_PYTHON="/nowhere/python")
+    assert done.returncode == 1
+    message, last = done.stderr.splitlines()
+    assert message.startswith(
+        "fiber_generator [logStatusError, 3]: this FMU needs Python, and the command /nowhere/python"
+    )
+    assert "COSIM_PYTHON" in message
+    assert last == "host: no instance of fiber_generator"
+
+
+def test_a_python_without_a_package_is_told_which_one(run: Run, binary: str, tmp_path: Path) -> None:
+    bare = tmp_path / "bare"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(bare)], check=True)
+    way = {"COSIM_PYTHON": str(bare / "bin" / "python")}
+    if binary == "pythonfmu":
+        way = {"LD_PRELOAD": _shared_python(), "PATH": f"{bare / 'bin'}:{os.environ['PATH']}"}
+    done = run(1, **way)
+    assert done.returncode == 1
+    # One message, over two lines where pythonfmu says how it came about, and what the host makes of it.
+    *message, last = done.stderr.splitlines()
+    assert len(message) == (1 if binary == "own" else 2)
+    assert "this FMU needs the Python package 'numpy', which the Python 3." in message[-1]
+    assert f" at {bare} does not have" in message[-1]
+    assert last == "host: no instance of fiber_generator"
