@@ -1,7 +1,5 @@
 """The modelDescription.xml of a unit's FMU, from the unit's own declaration (FMI 2.0.4, section 2.2).
 
-Written as text: a field of thousands of scalars makes an XML tree of many megabytes otherwise.
-
 What depends on what. Outputs change in a step only; `dependencies` therefore names, for each output, the inputs that
 the step carries over to it. An output that follows all inputs everywhere has no such attribute, which by the standard
 means just that; a pointwise one (active stress) names the inputs at its own place; one without inputs (fibres) has
@@ -18,28 +16,13 @@ from scipy.sparse import csr_matrix
 from ..units.input_ramp import INPUT_INTERPOLATION as INPUT_INTERPOLATION
 from ..units.mesh import Mesh
 from ..units.unit import Unit
-from ..units.variable import Causality, Location, Record
+from ..units.variable import Causality, Location
+from .annotations import TOOL as TOOL
+from .annotations import annotations
 from .layout import Run, layout
 from .messages import INVALID_INPUT
-
-#: Name under which the annotations that FMI has no place for (locations, recording) stand in VendorAnnotations.
-TOOL = "cardiac-cosim"
-
-#: SI base units and factor of every unit of measure that a variable may have.
-_UNITS: dict[str, dict[str, float]] = {
-    "1": {},
-    "deg": {"rad": 1, "factor": np.pi / 180.0},
-    "mm": {"m": 1, "factor": 1e-3},
-    "ml": {"m": 3, "factor": 1e-6},
-    "ms": {"s": 1, "factor": 1e-3},
-    "1/ms": {"s": -1, "factor": 1e3},
-    "mm2/ms": {"m": 2, "s": -1, "factor": 1e-3},
-    "mV": {"kg": 1, "m": 2, "s": -3, "A": -1, "factor": 1e-3},
-    "1/mV": {"kg": -1, "m": -2, "s": 3, "A": 1, "factor": 1e3},
-    "kPa": {"kg": 1, "m": -1, "s": -2, "factor": 1e3},
-    "MPa": {"kg": 1, "m": -1, "s": -2, "factor": 1e6},
-    "MPa/mV": {"m": -3, "s": 1, "A": 1, "factor": 1e9},
-}
+from .unit_definitions import unit_definitions
+from .xml_tag import tag
 
 _CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -57,7 +40,7 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
     return "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8"?>',
-            _tag(
+            tag(
                 "fmiModelDescription",
                 fmiVersion="2.0",
                 modelName=unit.name,
@@ -68,15 +51,18 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
                 generationTool=tool,
                 variableNamingConvention="structured",
             ),
-            _tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
-            *_unit_definitions(runs),
+            tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
+            *unit_definitions(unit),
             "<LogCategories>",
-            _tag("Category", name="logStatusWarning", description="Messages with the status fmi2Warning", end=True),
-            _tag("Category", name="logStatusError", description="Messages with the status fmi2Error", end=True),
-            _tag("Category", name=INVALID_INPUT, description="Errors in what the caller gave", end=True),
+            tag("Category", name="logStatusWarning", description="Messages with the status fmi2Warning", end=True),
+            tag("Category", name="logStatusError", description="Messages with the status fmi2Error", end=True),
+            tag("Category", name=INVALID_INPUT, description="Errors in what the caller gave", end=True),
             "</LogCategories>",
-            _tag("DefaultExperiment", startTime="0", stopTime="0.32", stepSize="0.001", end=True),
-            *_annotations(unit, runs),
+            tag("DefaultExperiment", startTime="0", stopTime="0.32", stepSize="0.001", end=True),
+            "<VendorAnnotations>",
+            tag("Tool", name=TOOL),
+            *annotations(unit),
+            "</Tool></VendorAnnotations>",
             "<ModelVariables>",
             *(line for run in runs for line in _scalars(run)),
             "</ModelVariables>",
@@ -86,7 +72,7 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
             "</Outputs>",
             "<InitialUnknowns>",
             *(
-                _tag("Unknown", index=str(run.first + 1 + k), end=True)
+                tag("Unknown", index=str(run.first + 1 + k), end=True)
                 for run in _outputs(runs)
                 for k in range(run.size)
             ),
@@ -98,42 +84,8 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
     )
 
 
-def _tag(element: str, /, end: bool = False, **attributes: str) -> str:
-    text = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
-    return f"<{element}{text}{'/' if end else ''}>"
-
-
 def _outputs(runs: tuple[Run, ...]) -> list[Run]:
     return [run for run in runs if run.variable.causality is Causality.OUTPUT]
-
-
-def _unit_definitions(runs: tuple[Run, ...]) -> Iterator[str]:
-    yield "<UnitDefinitions>"
-    for unit in sorted({run.variable.unit for run in runs if run.fmi_type == "Real"}):
-        base = {key: repr(value) for key, value in _UNITS[unit].items()}
-        yield _tag("Unit", name=unit) + _tag("BaseUnit", **base, end=True) + "</Unit>"
-    yield "</UnitDefinitions>"
-
-
-def _annotations(unit: type[Unit], runs: tuple[Run, ...]) -> Iterator[str]:
-    yield "<VendorAnnotations>"
-    yield _tag("Tool", name=TOOL) + _tag("Unit", name=unit.name, memoryless=str(unit.memoryless).lower())
-    for run in runs:
-        variable = run.variable
-        if variable.causality is Causality.PARAMETER:
-            continue
-        extra = {"needs": variable.needs} if variable.needs else {}
-        if variable.record is not Record.NOTHING:
-            extra["record"] = variable.record.value
-        yield _tag(
-            "Field",
-            name=variable.name,
-            location=variable.location.value,
-            fixed=str(variable.fixed).lower(),
-            **extra,
-            end=True,
-        )
-    yield "</Unit></Tool></VendorAnnotations>"
 
 
 def _scalars(run: Run) -> Iterator[str]:

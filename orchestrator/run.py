@@ -216,7 +216,8 @@ def _recipe(
         raise TypeError("a scenario without a scene has FMUs only")
     if scenario.run.participants == "native":
         return Recipe(name, parameters, ramps, unit=entry.unit, mesh=mesh)
-    return Recipe(name, parameters, ramps, fmu=fmu_of_unit(entry.unit, mesh, fmu_dir))
+    fmi = 3 if scenario.run.participants == "fmu3" else 2
+    return Recipe(name, parameters, ramps, fmu=fmu_of_unit(entry.unit, mesh, fmu_dir, fmi))
 
 
 def make_folder(folder: Path, option: str) -> None:

@@ -87,7 +87,7 @@ class Scene(_Section):
 
 
 class UnitEntry(_Section):
-    """One participant: a unit of this project by name, or any FMI 2.0 co-simulation FMU by path.
+    """One participant: a unit of this project by name, or any FMI 2.0 or 3.0 co-simulation FMU by path.
 
     `start` gives start values to variables of an FMU; `every` steps the unit at every so-many-th exchange only.
     """
@@ -169,14 +169,14 @@ class Coupling(_Section):
 
 
 class Run(_Section):
-    """How long, by FMUs or by direct calls, where the units work, and what guards a long run.
+    """How long, by FMUs (`fmu3`: of FMI 3.0) or by direct calls, where the units work, and what guards a long run.
 
     `workers` names where units step at the same time: `threads`, `processes`, or the address of a Dask scheduler.
     `checkpoint_every` counts accepted steps; 0 writes no checkpoints. `unit_time_limit_s` bounds a unit's step.
     """
 
     stop_ms: Positive = 320.0
-    participants: Literal["fmu", "native"] = "fmu"
+    participants: Literal["fmu", "fmu3", "native"] = "fmu"
     workers: Annotated[str | None, Field(pattern=_WORKERS)] = None
     unit_time_limit_s: Positive | None = None
     checkpoint_every: Annotated[int, Field(ge=0)] = 20

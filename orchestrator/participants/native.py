@@ -74,9 +74,9 @@ def element_quality(mesh: Mesh) -> Values:
     return signed_inverse_condition_number(mesh)
 
 
-def fmu_of_unit(unit: str, mesh: Mesh, fmu_dir: Path | None) -> Path:
-    """The FMU of a unit on `mesh`: from the cache if it is there, built otherwise."""
-    return cached_fmu(UNITS[unit], mesh, fmu_dir)
+def fmu_of_unit(unit: str, mesh: Mesh, fmu_dir: Path | None, fmi: int = 2) -> Path:
+    """The FMU of a unit on `mesh`, of FMI 2.0 or 3.0: from the cache if it is there, built otherwise."""
+    return cached_fmu(UNITS[unit], mesh, fmu_dir, fmi)
 
 
 class NativeParticipant:

@@ -145,7 +145,7 @@ _WRONG: dict[str, tuple[str | bytes, list[str]]] = {
         _changed("{unit: mechanics}", "{unt: mechanics}"),
         ["unknown key 'units.mechanics.unt'", "did you mean 'unit'?"],
     ),
-    "unknown key": (SMALL + "zzz: 1\n", ["unknown key 'zzz'", "(known: connections, coupling"]),
+    "unknown key": (SMALL + "zzz: 1\n", ["unknown key 'zzz'", "(known: connect_by_name, connections, coupling"]),
     "key with another unit of measure": (
         _changed("step_ms: 1", "step_s: 0.001"),
         ["unknown key 'coupling.step_s'", "did you mean 'step_ms'?"],
@@ -211,7 +211,7 @@ _WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "unknown scheme": (_changed("gauss-seidel", "quux"), ["'coupling.scheme' is 'quux'", "'gauss-seidel' or 'jacobi'"]),
     "scheme on": (_changed("gauss-seidel", "on"), ["'coupling.scheme' is 'on'", "'gauss-seidel' or 'jacobi'"]),
-    "participants yes": (_changed("native", "yes"), ["'run.participants' is 'yes'", "'fmu' or 'native'"]),
+    "participants yes": (_changed("native", "yes"), ["'run.participants' is 'yes'", "'fmu', 'fmu3' or 'native'"]),
     "misspelt participants": (_changed("native", "nativ"), ["'run.participants'", "did you mean 'native'?"]),
     "iteration without criteria": (
         _changed("step_ms: 1", "iterate: {max_iterations: 3}"),

@@ -1,0 +1,34 @@
+"""What FMI has no place for, as annotations: where a field sits, what of it is recorded, whether a unit has memory.
+
+The element `Unit` stands under VendorAnnotations in FMI 2.0 (FMI 2.0.4, section 2.2.6) and under Annotations in FMI 3.0
+(FMI 3.0, section 2.4), each time in an element that is named TOOL.
+"""
+
+from collections.abc import Iterator
+
+from ..units.unit import Unit
+from ..units.variable import Causality, Record
+from .xml_tag import tag
+
+#: Name under which the annotations stand.
+TOOL = "cardiac-cosim"
+
+
+def annotations(unit: type[Unit]) -> Iterator[str]:
+    """The lines of the element `Unit`, with a `Field` for each input and output."""
+    yield tag("Unit", name=unit.name, memoryless=str(unit.memoryless).lower())
+    for variable in unit.variables():
+        if variable.causality is Causality.PARAMETER:
+            continue
+        extra = {"needs": variable.needs} if variable.needs else {}
+        if variable.record is not Record.NOTHING:
+            extra["record"] = variable.record.value
+        yield tag(
+            "Field",
+            name=variable.name,
+            location=variable.location.value,
+            fixed=str(variable.fixed).lower(),
+            **extra,
+            end=True,
+        )
+    yield "</Unit>"

@@ -1,0 +1,118 @@
+"""The modelDescription.xml of a unit's FMI 3.0 FMU, from the unit's own declaration (FMI 3.0, section 2.4).
+
+A field is one Float64 variable with fixed dimensions, so that the text has the same length on every mesh.
+
+What depends on what. As in the FMI 2.0 description, `dependencies` names for each output the inputs that a step
+carries over to it; the list is absent where an output follows all inputs. FMI 3.0 lists whole variables: that a
+pointwise output follows its inputs at its own place only has no place in it.
+"""
+
+from collections.abc import Iterator
+from importlib.metadata import version
+from xml.sax.saxutils import quoteattr
+
+from ...units.mesh import Mesh
+from ...units.unit import Unit
+from ...units.variable import Causality
+from ..annotations import TOOL, annotations
+from ..messages import INVALID_INPUT
+from ..unit_definitions import unit_definitions
+from ..xml_tag import tag
+from .layout import TIME, Entry, layout
+
+_CAPABILITIES = {
+    "needsExecutionTool": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "canHandleVariableCommunicationStepSize": "true",
+}
+
+
+def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> str:
+    """The XML text for `unit` on `mesh`; `token` is the instantiation token, `tool` is what made the FMU."""
+    entries = layout(unit, mesh)
+    outputs = [entry for entry in entries if entry.variable.causality is Causality.OUTPUT]
+    return "\n".join(
+        [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            tag(
+                "fmiModelDescription",
+                fmiVersion="3.0",
+                modelName=unit.name,
+                instantiationToken=token,
+                description=(unit.__doc__ or "").splitlines()[0],
+                version=version(TOOL),
+                license="BSD-3-Clause",
+                generationTool=tool,
+                variableNamingConvention="structured",
+            ),
+            tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
+            *unit_definitions(unit, "s"),
+            "<LogCategories>",
+            tag("Category", name="logStatusWarning", description="Messages with the status fmi3Warning", end=True),
+            tag("Category", name="logStatusError", description="Messages with the status fmi3Error", end=True),
+            tag("Category", name=INVALID_INPUT, description="Errors in what the caller gave", end=True),
+            "</LogCategories>",
+            tag("DefaultExperiment", startTime="0", stopTime="0.32", stepSize="0.001", end=True),
+            "<ModelVariables>",
+            tag(
+                "Float64",
+                name="time",
+                valueReference=str(TIME),
+                causality="independent",
+                variability="continuous",
+                unit="s",
+                description="time that the unit has come to",
+                end=True,
+            ),
+            *(_variable(entry) for entry in entries),
+            "</ModelVariables>",
+            "<ModelStructure>",
+            *_outputs(entries, outputs),
+            *(tag("InitialUnknown", valueReference=str(entry.reference), end=True) for entry in outputs),
+            "</ModelStructure>",
+            "<Annotations>",
+            tag("Annotation", type=TOOL),
+            *annotations(unit),
+            "</Annotation></Annotations>",
+            "</fmiModelDescription>",
+            "",
+        ]
+    )
+
+
+def _variable(entry: Entry) -> str:
+    variable = entry.variable
+    attributes = {"name": variable.name, "valueReference": str(entry.reference), "causality": variable.causality.value}
+    if variable.causality is Causality.PARAMETER:
+        attributes |= {"variability": "fixed", "initial": "exact"}
+    else:
+        attributes |= {"variability": "discrete" if variable.fixed else "continuous"}
+    if variable.causality is Causality.OUTPUT:
+        attributes |= {"initial": "calculated"}
+    attributes |= {"description": variable.description}
+    if entry.fmi_type == "Float64":
+        attributes |= {"unit": variable.unit}
+    # FMI's bounds are inclusive: an exclusive one (above) stays with the unit, which checks it.
+    if variable.at_least is not None:
+        attributes |= {"min": f"{variable.at_least:.17g}"}
+    nested = "".join(tag("Dimension", start=str(count), end=True) for count in entry.shape)
+    if variable.causality is not Causality.OUTPUT:
+        if entry.fmi_type == "String":
+            nested += f"<Start value={quoteattr(str(variable.start))}/>"
+        else:
+            # Of a float, as many digits as it takes to read the same one back; of a field, one value for all places.
+            attributes |= {"start": str(variable.start)}
+    return tag(entry.fmi_type, **attributes, end=False) + nested + f"</{entry.fmi_type}>"
+
+
+def _outputs(entries: tuple[Entry, ...], outputs: list[Entry]) -> Iterator[str]:
+    inputs = {entry.variable.name: entry for entry in entries if entry.variable.causality is Causality.INPUT}
+    for entry in outputs:
+        followed = entry.variable.depends_on
+        attributes = {"valueReference": str(entry.reference)}
+        # Where there are no inputs, an absent list would mean a dependence on the time all the same.
+        if not len(followed) == len(inputs) > 0:
+            attributes |= {"dependencies": " ".join(str(inputs[name].reference) for name in followed)}
+        yield tag("Output", **attributes, end=True)
