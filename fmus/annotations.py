@@ -6,6 +6,7 @@ The element `Unit` stands under VendorAnnotations in FMI 2.0 (FMI 2.0.4, section
 
 from collections.abc import Iterator
 
+from ..units.statistics import Statistic
 from ..units.unit import Unit
 from ..units.variable import Causality, Record
 from .xml_tag import tag
@@ -23,6 +24,8 @@ def annotations(unit: type[Unit]) -> Iterator[str]:
         extra = {"needs": variable.needs} if variable.needs else {}
         if variable.record is not Record.NOTHING:
             extra["record"] = variable.record.value
+        if isinstance(variable, Statistic):
+            extra["of"] = variable.source.name
         yield tag(
             "Field",
             name=variable.name,

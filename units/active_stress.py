@@ -89,7 +89,7 @@ class ActiveStress(Unit):
             Location.NODE,
             depends_on=("potential", "stretch"),
             pointwise=True,
-            record=Record.MEAN,
+            mean_record=Record.VALUE,
         ),
     )
 

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .arrays import FloatArray
+from .arrays import FloatArray, frozen
 from .directions import FIBER_INPUT, check_directions
 from .electrophysiology.aliev_panfilov import AlievPanfilov
+from .electrophysiology.probes import PROBED, Probes
 from .electrophysiology.stimulus import Stimulus
 from .electrophysiology.time_scale import TimeScale
 from .electrophysiology.unit import NOT_ACTIVATED, Electrophysiology, PotentialScale
@@ -48,7 +49,7 @@ class Eikonal(Unit):
     """Activation by the eikonal equation, with the cell model's pulse behind it."""
 
     name = "eikonal"
-    groups = (PotentialScale, AlievPanfilov, Spread, TimeScale, Stimulus)
+    groups = (PotentialScale, AlievPanfilov, Spread, TimeScale, Stimulus, Probes)
     fields = (
         FIBER_INPUT,
         *(
@@ -73,6 +74,7 @@ class Eikonal(Unit):
         diffusion = across * np.eye(3) + along * fiber[:, :, None] * fiber[:, None, :]
         rate = 1.0 / self._time_scale[self.mesh.cells].mean(axis=1)
         metric = np.linalg.inv(diffusion * (speed_squared * rate)[:, None, None])
+        self._probes = self.parameters(Probes).places(self.mesh)
         # A stimulus below the threshold of excitation dies away.
         stimulated = (stimulus.stimulus_potential_mV - scale.rest_potential_mV) / scale.potential_range_mV
         released = np.where(stimulus.nodes(self.mesh.points) & (stimulated > ionic.excitation_threshold), 0.0, np.inf)
@@ -110,7 +112,9 @@ class Eikonal(Unit):
         return {"time": np.asarray(time + step)}
 
     def output(self, name: str, state: State) -> FloatArray:
-        """Potential in mV or activation time in ms, shape (nodes,)."""
+        """Potential in mV or activation time in ms, shape (nodes,); potential at a probe, a scalar."""
+        if name in PROBED:
+            return frozen(self._probes(self.output("potential", state))[PROBED.index(name)])
         now = float(state["time"])
         if name == "activation_time":
             values = np.where(self._arrival <= now, self._arrival, NOT_ACTIVATED)

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from enum import Enum
+from functools import cache
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -13,6 +14,7 @@ from .errors import CallOrderError, InvalidInput, StepFailure
 from .input_ramp import INPUT_INTERPOLATION
 from .mesh import Mesh
 from .snapshot import Snapshot, State
+from .statistics import Statistic, statistics
 from .variable import Causality, Location, Scalar, Variable, parameters_of
 
 Group = TypeVar("Group")
@@ -33,7 +35,8 @@ class Unit(ABC):
 
     A subclass declares `name`, `groups` (frozen dataclasses of parameters), `fields` (inputs and outputs) and three
     methods that never change an array in place: `prepare`, `initial` and `advance`. What `advance` returns replaces
-    the state only when it is complete and finite, so a step that fails leaves the unit as it was.
+    the state only when it is complete and finite, so a step that fails leaves the unit as it was. The mean and maximum
+    of every output field that moves are outputs as well (`statistics`), of which a subclass need not know.
 
     Times are seconds at this interface, as in FMI; inside, the physics is in ms.
     """
@@ -57,16 +60,26 @@ class Unit(ABC):
 
     @classmethod
     def variables(cls) -> tuple[Variable, ...]:
-        """Every variable of the unit: parameters first, then inputs and outputs."""
-        return (*(variable for group in cls.groups for variable in parameters_of(group)), *cls.fields)
+        """Every variable of the unit: parameters first, then inputs and outputs, then the outputs' statistics."""
+        return tuple(_declared(cls.groups, cls.fields).values())
+
+    @classmethod
+    def inputs(cls) -> tuple[Variable, ...]:
+        """The inputs."""
+        return tuple(variable for variable in cls.fields if variable.causality is Causality.INPUT)
+
+    @classmethod
+    def outputs(cls) -> tuple[Variable, ...]:
+        """The outputs, statistics of fields included."""
+        return tuple(variable for variable in cls.variables() if variable.causality is Causality.OUTPUT)
 
     @classmethod
     def variable(cls, name: str) -> Variable:
         """The variable `name`; InvalidInput if the unit has none."""
-        for variable in cls.variables():
-            if variable.name == name:
-                return variable
-        raise InvalidInput(f"unit '{cls.name}' has no variable '{name}'")
+        try:
+            return _declared(cls.groups, cls.fields)[name]
+        except KeyError:
+            raise InvalidInput(f"unit '{cls.name}' has no variable '{name}'") from None
 
     # --- life cycle, in FMI order -------------------------------------------------------------------------------------
 
@@ -86,8 +99,8 @@ class Unit(ABC):
     def enter_initialization_mode(self) -> None:
         """From here inputs get their initial values."""
         self._require(Phase.INSTANTIATED)
-        for variable in self.fields:
-            if variable.causality is Causality.INPUT and variable.name not in self._inputs:
+        for variable in self.inputs():
+            if variable.name not in self._inputs:
                 self._inputs[variable.name] = self._default(variable)
         self.phase = Phase.INITIALIZATION
 
@@ -162,6 +175,8 @@ class Unit(ABC):
         if variable.causality is Causality.INPUT:
             return self._inputs[name] if name in self._inputs else self._default(variable)
         self._require(Phase.STEPPING, Phase.TERMINATED)
+        if isinstance(variable, Statistic):
+            return variable(self.output(variable.source.name, self._state))
         return self.output(name, self._state)
 
     def parameters(self, group: type[Group]) -> Group:
@@ -198,7 +213,7 @@ class Unit(ABC):
         ):
             if {name: value.shape for name, value in arrays.items()} != {name: own[name].shape for name in own}:
                 raise InvalidInput(f"the {kind} arrays of the state do not fit unit '{self.name}'")
-        for variable in self.fields:
+        for variable in self.inputs():
             name = variable.name
             fixed = variable.fixed and name in self._inputs
             if fixed and not np.array_equal(snapshot.inputs[name], self._inputs[name]):
@@ -229,7 +244,7 @@ class Unit(ABC):
 
     @abstractmethod
     def output(self, name: str, state: State) -> FloatArray:
-        """The output `name` in `state`, read-only, of the declared shape."""
+        """The output `name` of `fields` in `state`, read-only, of the declared shape."""
 
     @property
     def _ramps(self) -> bool:
@@ -287,3 +302,15 @@ class Unit(ABC):
                 raise StepFailure(f"'{name}' is not finite any more, first at index {where.tolist()}")
             value.setflags(write=False)
         return state
+
+
+@cache
+def _declared(groups: tuple[type, ...], fields: tuple[Variable, ...]) -> dict[str, Variable]:
+    """All variables by name, in their order; kept, because every `get` and `set` looks one up."""
+    parameters = (variable for group in groups for variable in parameters_of(group))
+    declared: dict[str, Variable] = {}
+    for variable in (*parameters, *fields, *statistics(fields)):
+        if variable.name in declared:
+            raise TypeError(f"the variable '{variable.name}' is declared twice")
+        declared[variable.name] = variable
+    return declared

@@ -30,12 +30,11 @@ class Location(Enum):
 
 
 class Record(Enum):
-    """What a time series keeps of an output: its value (scalars), its value at the probes, its mean, or nothing."""
+    """What a time series keeps of an output: its value (scalars), its value at the probes, or nothing."""
 
     NOTHING = "nothing"
     VALUE = "value"
     PROBES = "probes"
-    MEAN = "mean"
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,7 @@ class Variable:
     `unit` is the unit of measure ("mV"; "1" for a pure number). `depends_on` names the inputs that an output follows;
     `pointwise` says that its value at a place follows those inputs at this place only. `fixed` variables keep their
     value after initialisation. `needs` names a parameter that must differ from zero for the input to matter.
+    `missing` is the value at places that have none yet; `mean_record` says of a field what `record` says of its mean.
     """
 
     name: str
@@ -59,6 +59,8 @@ class Variable:
     pointwise: bool = False
     needs: str | None = None
     record: Record = Record.NOTHING
+    mean_record: Record = Record.NOTHING
+    missing: float | None = None
     above: float | None = None
     at_least: float | None = None
     below: float | None = None

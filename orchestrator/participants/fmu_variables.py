@@ -138,6 +138,8 @@ def real_fields(path: Path, variables: Iterable[Any], parameters: Parameters) ->
         # An array of FMI 3.0 is one variable, without an index.
         shape = shape or members[0][1].shape
         extra = annotations.get(name, {})
+        # Of a foreign FMU every number is worth a column; this project's say so themselves.
+        unsaid = "nothing" if shape or extra else "value"
         port = Port(
             name,
             members[0][1].unit,
@@ -145,8 +147,9 @@ def real_fields(path: Path, variables: Iterable[Any], parameters: Parameters) ->
             extra.get("location", None if shape else "global"),
             extra.get("fixed") == "true" or members[0][1].variability in ("constant", "fixed"),
             live="needs" not in extra or float(values[extra["needs"]]) != 0.0,
-            record=extra.get("record", "nothing" if shape else "value"),
+            record=extra.get("record", unsaid),
             needs=extra.get("needs"),
+            of=extra.get("of"),
         )
         fields[causality].append(Field(port, [variable.valueReference for _, variable in members]))
     return fields["input"], fields["output"]

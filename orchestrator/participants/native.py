@@ -1,5 +1,6 @@
 """The one door to the units' floor: meshes, declarations, and units as participants without FMI."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ...fmus.cache import cached_fmu
@@ -8,9 +9,11 @@ from ...units.geometry.registry import build as build_geometry
 from ...units.input_ramp import INPUT_INTERPOLATION
 from ...units.mesh import Mesh
 from ...units.mesh.file import read_mesh
+from ...units.mesh.places import Places
 from ...units.mesh.quality import signed_inverse_condition_number
 from ...units.registry import UNITS
 from ...units.snapshot import Snapshot
+from ...units.statistics import Statistic
 from ...units.unit import Unit
 from ...units.variable import Causality, Variable
 from ..errors import InputError, ParticipantError, did_you_mean
@@ -18,7 +21,16 @@ from ..scenario import Scene
 from .participant import Abilities, Parameters, Port, Ramp, Values, Wait
 from .ramping import PendingRamps
 
-__all__ = ["Mesh", "NativeParticipant", "check_unit", "element_quality", "fmu_of_unit", "scene_mesh", "unit_ports"]
+__all__ = [
+    "Mesh",
+    "NativeParticipant",
+    "check_unit",
+    "element_quality",
+    "fmu_of_unit",
+    "located",
+    "scene_mesh",
+    "unit_ports",
+]
 
 
 def scene_mesh(scene: Scene, folder: Path) -> Mesh:
@@ -62,16 +74,25 @@ def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[dict[str,
             variable.needs is None or bool(given[variable.needs]),
             variable.record.value,
             variable.needs,
+            variable.source.name if isinstance(variable, Statistic) else None,
         )
 
-    inputs = {item.name: port(item) for item in kind.fields if item.causality is Causality.INPUT}
-    outputs = {item.name: port(item) for item in kind.fields if item.causality is Causality.OUTPUT}
+    inputs = {item.name: port(item) for item in kind.inputs()}
+    outputs = {item.name: port(item) for item in kind.outputs()}
     return inputs, outputs
 
 
 def element_quality(mesh: Mesh) -> Values:
     """SICN of each tetrahedron, shape (elements,)."""
     return signed_inverse_condition_number(mesh)
+
+
+def located(mesh: Mesh, points_mm: Sequence[Sequence[float]]) -> Places:
+    """Where points lie in `mesh`; InputError for one that lies nowhere."""
+    try:
+        return Places(mesh, points_mm)
+    except InvalidInput as error:
+        raise InputError(str(error)) from None
 
 
 def fmu_of_unit(unit: str, mesh: Mesh, fmu_dir: Path | None, fmi: int = 2) -> Path:

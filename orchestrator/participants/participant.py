@@ -17,7 +17,7 @@ class Port:
     `unit` is the unit of measure, None where an FMU declares none. `location` is `node`, `element` or `global`, None
     where unknown. A `fixed` port is exchanged once, at initialisation. A port that is not `live` has no influence with
     the parameters given, because the one it `needs` is zero, and is not connected. `record` says what a time series
-    keeps: `value`, `probes`, `mean`.
+    keeps: `value`, `probes`. A number that is drawn from a field, such as its mean, is `of` that output.
     """
 
     name: str
@@ -28,6 +28,7 @@ class Port:
     live: bool = True
     record: str = "nothing"
     needs: str | None = None
+    of: str | None = None
 
     @property
     def size(self) -> int:

@@ -1,4 +1,4 @@
-"""timeseries.csv: scalars, probes and means after every accepted step."""
+"""timeseries.csv: scalars and probes after every accepted step."""
 
 from collections.abc import Mapping
 from math import isnan, nan
@@ -36,9 +36,8 @@ class TimeSeries:
             for port in participant.outputs.values()
             if port.record != "nothing"
         ]
-        # Probed fields first, then scalars, then means.
-        rank = {"probes": 0, "value": 1, "mean": 2}
-        self._recorded.sort(key=lambda item: rank[item[1].record])
+        # Probed fields first, then scalars, then those that are drawn from a field.
+        self._recorded.sort(key=lambda item: (item[1].record != "probes", item[1].of is not None))
         self.columns = ["time_ms"]
         for unit, port in self._recorded:
             names = ["time_ms", *(other.column for _, other in self._recorded)]
@@ -48,7 +47,7 @@ class TimeSeries:
             if port.record == "probes":
                 self.columns += [f"{stem}_{probe}{suffix}" for probe in (probes.names if probes else ())]
             else:
-                self.columns.append(f"{stem}_mean{suffix}" if port.record == "mean" else f"{stem}{suffix}")
+                self.columns.append(f"{stem}{suffix}")
         self.rows: list[list[float]] = [] if resumed is None else np.atleast_2d(resumed["rows"]).tolist()
         self._table = Table(folder / "timeseries.csv", self.columns, None if resumed is None else len(self.rows))
 
@@ -65,7 +64,7 @@ class TimeSeries:
             if port.record == "probes":
                 row += self._probes(values) if self._probes else []
             else:
-                row.append(float(values.mean()) if port.record == "mean" else float(values))
+                row.append(float(values))
         self.rows.append(row)
         self._table.add([None if isnan(value) else value for value in row])
 

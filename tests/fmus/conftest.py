@@ -16,7 +16,6 @@ from cardiac_cosim.fmus.build import build_fmu
 from cardiac_cosim.units.geometry import registry
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.registry import UNITS
-from cardiac_cosim.units.variable import Causality
 
 HERE = Path(__file__).parent
 
@@ -91,7 +90,7 @@ def _native(case: Case) -> list[Fields]:
     for name, values in case.first().items():
         unit.set(name, values)
     unit.exit_initialization_mode()
-    names = [variable.name for variable in kind.fields if variable.causality is Causality.OUTPUT]
+    names = [variable.name for variable in kind.outputs()]
     seen = [{name: np.array(unit.get(name)) for name in names}]
     for (time, size), inputs in zip(case.steps, case.inputs, strict=True):
         for name, values in inputs.items():
@@ -107,7 +106,7 @@ def _cases(mesh: Mesh) -> dict[str, Case]:
     ranges = {"potential": (-80.0, 20.0), "stretch": (0.95, 1.05), "active_stress": (0.0, 5.0)}
     cases = {}
     for name, kind in UNITS.items():
-        taken = [variable for variable in kind.fields if variable.causality is Causality.INPUT]
+        taken = kind.inputs()
         fixed = {variable.name: fibers[variable.name] for variable in taken if variable.fixed}
         varying = [variable for variable in taken if not variable.fixed]
         inputs = [{v.name: random.uniform(*ranges[v.name], v.shape(mesh)) for v in varying} for _ in range(4)]

@@ -59,11 +59,10 @@ def unit(request: pytest.FixtureRequest) -> str:
 
 
 def _outputs(unit: str, mesh: Mesh) -> Iterator[str]:
-    for variable in UNITS[unit].fields:
-        if variable.causality is Causality.OUTPUT:
-            shape = variable.shape(mesh)
-            for index in np.ndindex(*shape):
-                yield f"{variable.name}[{','.join(str(i + 1) for i in index)}]" if shape else variable.name
+    for variable in UNITS[unit].outputs():
+        shape = variable.shape(mesh)
+        for index in np.ndindex(*shape):
+            yield f"{variable.name}[{','.join(str(i + 1) for i in index)}]" if shape else variable.name
 
 
 def test_fmpy_has_nothing_to_say(unit: str, fmus: dict) -> None:
@@ -187,7 +186,12 @@ def test_fibres_depend_on_nothing(fmus: dict) -> None:
 def test_active_stress_depends_on_its_own_place(tiny: Mesh, fmus: dict) -> None:
     root = _root(fmus["active_stress"])
     names = [element.get("name") for element in root.findall("ModelVariables/ScalarVariable")]
-    for unknown in root.findall("ModelStructure/Outputs/Unknown"):
+    unknowns = root.findall("ModelStructure/Outputs/Unknown")
+    scalars = [unknown for unknown in unknowns if "[" not in names[int(unknown.get("index")) - 1]]
+    # Its mean and maximum are of all places, and so follow all inputs: no attribute.
+    assert [names[int(unknown.get("index")) - 1] for unknown in scalars] == ["active_stress_mean", "active_stress_max"]
+    assert all("dependencies" not in unknown.attrib for unknown in scalars)
+    for unknown in (each for each in unknowns if each not in scalars):
         node = int(re.fullmatch(r"active_stress\[(\d+)\]", names[int(unknown.get("index")) - 1])[1])
         around = np.flatnonzero((tiny.cells == node - 1).any(axis=1)) + 1
         assert [names[int(index) - 1] for index in unknown.get("dependencies").split()] == [

@@ -55,7 +55,10 @@ def _nothing_but_nan(driver: Any) -> None:
 
 def test_expected_values_move(stepping: Any) -> None:
     # Otherwise all comparisons below would hold for a unit that does nothing.
-    for name in set(stepping.expected[0]) - {"activation_time"}:
+    # No wave moves on in these few steps, and where fibres lie in the fixed base they are the longest all the time.
+    still = {"activation_time", "activation_time_mean", "activation_time_max"}
+    still |= {"stretch_max"} if stepping.unit == "mechanics" else set()
+    for name in set(stepping.expected[0]) - still:
         assert (stepping.expected[1][name] != stepping.expected[4][name]).any(), name
 
 

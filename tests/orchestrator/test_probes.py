@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.errors import InputError
-from cardiac_cosim.orchestrator.participants.native import Mesh
+from cardiac_cosim.orchestrator.participants.native import Mesh, NativeParticipant
 from cardiac_cosim.orchestrator.probes import Probes
 
 _SLOPE = np.array([2.0, -3.0, 0.5])
@@ -56,3 +56,19 @@ def test_a_point_off_the_tissue_is_refused_with_the_nearest_node(small_heart: Me
 def test_a_point_that_is_no_number_is_never_inside(small_heart: Mesh) -> None:
     with pytest.raises(InputError, match="outside the mesh"):
         Probes(small_heart, {"lost": [0.0, 0.0, float("nan")]})
+
+
+def test_a_unit_shows_at_its_probes_what_a_scenario_records_there(small_heart: Mesh) -> None:
+    points = {"base": [25.0, 0.0, -1.0], "middle": [20.0, 0.0, -40.0], "apex": [0.0, 0.0, -60.0]}
+    fibers = NativeParticipant("fibers", "fiber_generator", small_heart, {})
+    wave = NativeParticipant("wave", "electrophysiology", small_heart, {"stimulus_depth_mm": 5.0})
+    for participant in (fibers, wave):
+        participant.begin()
+        if participant is wave:
+            wave.set("fiber", fibers.get("fiber"))
+        participant.complete()
+    wave.start(0.0, 0.02)()
+    shown = [float(wave.get(f"potential_probe_{number}")) for number in (1, 2, 3)]
+    # To the bit: there is one way of interpolating.
+    assert Probes(small_heart, points)(wave.get("potential")) == shown
+    assert shown[0] > -70.0 > shown[2]

@@ -10,7 +10,6 @@ from cardiac_cosim.units.fiber_generator import FiberGenerator
 from cardiac_cosim.units.geometry.registry import build
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.mesh.arrival_times import arrival_times
-from cardiac_cosim.units.variable import Causality
 
 _UNIFORM = {"time_scale_reduction": 0.0, "stimulus_x_min_mm": -1.0, "stimulus_x_max_mm": 8.0}
 
@@ -95,8 +94,5 @@ def test_a_stimulus_below_the_threshold_starts_no_wave(started: Any) -> None:
 
 
 def test_it_gives_what_the_monodomain_gives() -> None:
-    outputs = [
-        [item.name for item in kind.fields if item.causality is Causality.OUTPUT]
-        for kind in (Eikonal, Electrophysiology)
-    ]
+    outputs = [[item.name for item in kind.outputs()] for kind in (Eikonal, Electrophysiology)]
     assert outputs[0] == outputs[1]

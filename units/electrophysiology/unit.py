@@ -3,8 +3,8 @@
     ∂Φ/∂t = ∇·(D∇Φ) − (β_φ/β_t)(Ĩ_e + Ĩ_m),   zero flux,   Ĩ_m = G_s max(λ − 1, 0)(φ − φ_s)
 
 Inputs: the stretch λ of the elements, held over a step or ramped (then each substep sees it as it is in its middle),
-and once the fibre directions. Outputs: the transmembrane potential and the activation time at the nodes. Source:
-model.md, Electrophysiology.
+and once the fibre directions. Outputs: the transmembrane potential and the activation time at the nodes, and the
+potential at three probes. Source: model.md, Electrophysiology.
 
 With `refine` the unit solves on a nested refinement of the scene's mesh: fibre and stretch are those of the element
 that a part lies in, potential and activation time are given at the scene's nodes.
@@ -20,7 +20,7 @@ from math import ceil
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
 from ..input_ramp import InputRamp
@@ -30,6 +30,7 @@ from ..unit import Unit
 from ..variable import Causality, Location, Record, Variable, parameter
 from .aliev_panfilov import AlievPanfilov
 from .monodomain import Conduction, Monodomain
+from .probes import PROBED, Probes, probe_outputs
 from .stimulus import Stimulus
 from .time_scale import TimeScale
 
@@ -58,7 +59,7 @@ class Electrophysiology(Unit):
     """Monodomain with stretch-activated current on linear elements."""
 
     name = "electrophysiology"
-    groups = (PotentialScale, Resolution, AlievPanfilov, Conduction, TimeScale, Stimulus, InputRamp)
+    groups = (PotentialScale, Resolution, AlievPanfilov, Conduction, TimeScale, Stimulus, Probes, InputRamp)
     fields = (
         Variable(
             "stretch",
@@ -87,7 +88,9 @@ class Electrophysiology(Unit):
             "time of the first upward crossing of the activation potential; -1 before it",
             Location.NODE,
             depends_on=("stretch", "fiber"),
+            missing=NOT_ACTIVATED,
         ),
+        *probe_outputs(depends_on=("stretch", "fiber")),
     )
 
     def prepare(self) -> None:
@@ -104,6 +107,7 @@ class Electrophysiology(Unit):
                 f"parameter 'longest_substep_ms' is {self._resolution.longest_substep_ms:g}; above {longest:.3g} ms "
                 "the explicit step of the ionic model does not resolve the upstroke"
             )
+        self._probes = self.parameters(Probes).places(self.mesh)
         self._inner = refined(self.mesh, self._resolution.refine)
         inherited = fiber[self._inner.parents]
         self._monodomain = Monodomain(self._inner.mesh, inherited, time_scale, self.parameters(Conduction))
@@ -151,7 +155,9 @@ class Electrophysiology(Unit):
         return {"phi": phi, "recovery": recovery, "activation_time": activation_time}
 
     def output(self, name: str, state: State) -> FloatArray:
-        """Potential in mV or activation time in ms, shape (nodes,)."""
+        """Potential in mV or activation time in ms, shape (nodes,); potential at a probe, a scalar."""
+        if name in PROBED:
+            return frozen(self._probes(self.output("potential", state))[PROBED.index(name)])
         # The first nodes of a refined mesh are those of the scene's.
         if name == "activation_time":
             return state["activation_time"][: self.mesh.nodes]
