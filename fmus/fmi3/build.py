@@ -21,6 +21,8 @@ from .model_description import model_description
 
 #: What an FMU carries of this folder, besides what one for FMI 2.0 does.
 _OWN_FILES = ("__init__.py", "instance.py", "layout.py", "slave.py")
+#: And what it does not, whatever the binary of the one for FMI 2.0 is.
+_PYTHONFMU_FILE = "fmus/pythonfmu_slave.py"
 
 #: The binary finds its class by a regular expression that wants this base's name, and stops the process if this file
 #: cannot be imported; so it imports nothing before the class is called.
@@ -61,14 +63,19 @@ class {name}(Fmi3Slave):
 def sources() -> dict[str, bytes]:
     """The code an FMU carries, by its path in the package."""
     own = Path(__file__).parent
-    return fmi2.sources() | {f"fmus/fmi3/{name}": (own / name).read_bytes() for name in _OWN_FILES}
+    shared = {name: content for name, content in fmi2.sources().items() if name != _PYTHONFMU_FILE}
+    return shared | {f"fmus/fmi3/{name}": (own / name).read_bytes() for name in _OWN_FILES}
 
 
 def fingerprint(unit: type[Unit], mesh: Mesh) -> str:
     """A hash of all that decides what the FMI 3.0 FMU of `unit` on `mesh` holds."""
-    digest = hashlib.sha256(f"FMI 3.0 pythonfmu3 {version('pythonfmu3')} {fmi2.fingerprint(unit, mesh)}".encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    digest = hashlib.sha256(f"FMI 3.0 {unit.name} {version(TOOL)} pythonfmu3 {version('pythonfmu3')}".encode())
+    own = Path(__file__).parent
+    for path in sorted([*own.glob("*.py"), *own.parent.glob("*.py")]):
         digest.update(path.read_bytes())
+    for name, content in sources().items():
+        digest.update(name.encode() + content)
+    digest.update(mesh.fingerprint.encode())
     return digest.hexdigest()
 
 
