@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..units.errors import InvalidInput
+from ..units.errors import InvalidInput, StepFailure
 from ..units.mesh.archive import unpack_mesh
 from ..units.registry import UNITS
 from ..units.snapshot import Snapshot
@@ -64,6 +64,7 @@ class UnitInstance:
 
     def set_reals(self, references: np.ndarray, values: np.ndarray) -> None:
         """fmi2SetReal; the arrays, shape (n,), are the caller's and are copied."""
+        self._forget_foreseen()
         run = self._whole_run(references)
         if run is not None:
             self._expect(run, int(references[0]), "Real")
@@ -97,6 +98,7 @@ class UnitInstance:
 
     def set_scalars(self, fmi_type: str, references: Sequence[int], values: Sequence[Any]) -> None:
         """fmi2SetInteger, fmi2SetBoolean and fmi2SetString: parameters only."""
+        self._forget_foreseen()
         for reference, value in zip(references, values, strict=True):
             run = self._run(reference, fmi_type)
             self.unit.set(run.variable.name, value)
@@ -126,6 +128,11 @@ class UnitInstance:
         self._read.clear()
         return call()
 
+    def _forget_foreseen(self) -> None:
+        # During the initialization outputs follow whatever is set; afterwards they change in steps only.
+        if self.unit.phase is Phase.INITIALIZATION:
+            self._read.clear()
+
     def _stage(self, run: Run) -> np.ndarray:
         name = run.variable.name
         if name not in self._staged:
@@ -137,12 +144,27 @@ class UnitInstance:
 
     def _values(self, run: Run, warnings: list[str]) -> np.ndarray:
         name = run.variable.name
-        if run.variable.causality is Causality.OUTPUT and self.unit.phase not in (Phase.STEPPING, Phase.TERMINATED):
-            warnings.append(f"'{name}' has no value before the initialization is complete; it reads as NaN")
-            return np.full(run.size, np.nan)
         if name not in self._read:
-            self._read[name] = np.asarray(self.unit.get(name), dtype=float).reshape(-1)
+            value = self._output(name, warnings) if run.variable.causality is Causality.OUTPUT else self.unit.get(name)
+            if value is None:
+                return np.full(run.size, np.nan)
+            self._read[name] = np.asarray(value, dtype=float).reshape(-1)
         return self._read[name]
+
+    def _output(self, name: str, warnings: list[str]) -> Any:
+        """An output; None, with a warning, if it has no value yet."""
+        if self.unit.phase is Phase.INSTANTIATED:
+            warnings.append(f"'{name}' has no value before the initialization; it reads as NaN")
+            return None
+        if self.unit.phase is not Phase.INITIALIZATION:
+            return self.unit.get(name)
+        try:
+            return self.unit.get(name)
+        except (InvalidInput, StepFailure) as error:
+            warnings.append(
+                f"'{name}' has no value as long as the initialization cannot end ({error}); it reads as NaN"
+            )
+            return None
 
     def _whole_run(self, references: np.ndarray) -> Run | None:
         """The run whose value references these are, all of them in their order."""

@@ -7,7 +7,14 @@ from .errors import InvalidInput
 from .variable import Causality, Location, Variable
 
 FIBER_INPUT = Variable(
-    "fiber", Causality.INPUT, "1", "fibre direction, a unit vector", Location.ELEMENT, components=3, fixed=True
+    "fiber",
+    Causality.INPUT,
+    "1",
+    "fibre direction, a unit vector",
+    Location.ELEMENT,
+    components=3,
+    fixed=True,
+    guess=(1.0, 0.0, 0.0),
 )
 SHEET_INPUT = Variable(
     "sheet",
@@ -17,6 +24,7 @@ SHEET_INPUT = Variable(
     Location.ELEMENT,
     components=3,
     fixed=True,
+    guess=(0.0, 1.0, 0.0),
 )
 
 #: Deviation from a unit vector, or from a right angle, that is taken for rounding in another tool.

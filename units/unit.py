@@ -55,6 +55,8 @@ class Unit(ABC):
         # The inputs at the end of the last step, where they are ramped; else empty.
         self._begins: dict[str, FloatArray] = {}
         self._state: dict[str, FloatArray] = {}
+        # The state that the initialisation would end in as things are, if somebody wanted to know.
+        self._foreseen: dict[str, FloatArray] | None = None
 
     # --- declaration -------------------------------------------------------------------------------------------------
 
@@ -115,6 +117,7 @@ class Unit(ABC):
             If the physics has no initial state.
         """
         self._require(Phase.INITIALIZATION)
+        self._foreseen = None
         self.prepare()
         self._state = self._sound(self.initial(self._inputs))
         self._begins = dict(self._inputs) if self._ramps else {}
@@ -150,34 +153,50 @@ class Unit(ABC):
         self._inputs = {}
         self._begins = {}
         self._state = {}
+        self._foreseen = None
 
     # --- values -------------------------------------------------------------------------------------------------------
 
     def set(self, name: str, value: ArrayLike | str) -> None:
-        """Set a parameter (before initialisation) or an input (shape as declared, finite)."""
+        """Set a parameter (until the initialisation is over) or an input (shape as declared, finite)."""
         variable = self.variable(name)
         if variable.causality is Causality.PARAMETER:
-            self._require(Phase.INSTANTIATED)
+            self._require(Phase.INSTANTIATED, Phase.INITIALIZATION)
             self._parameters[name] = variable.checked(value)
         elif variable.causality is Causality.INPUT:
             self._require(Phase.INSTANTIATED, Phase.INITIALIZATION, Phase.STEPPING)
+            field = self._field(variable, value)
             if variable.fixed and self.phase is Phase.STEPPING:
-                raise CallOrderError(f"input '{name}' of unit '{self.name}' is fixed after initialisation")
-            self._inputs[name] = self._field(variable, value)
+                # Many masters set every connected input before every step.
+                if not np.array_equal(field, self._inputs[name]):
+                    raise CallOrderError(f"input '{name}' of unit '{self.name}' is fixed after initialisation")
+                return
+            self._inputs[name] = field
         else:
             raise InvalidInput(f"'{name}' is an output of unit '{self.name}' and cannot be set")
+        self._foreseen = None
 
     def get(self, name: str) -> Any:
-        """A variable's value: read-only array of the declared shape, or the parameter's scalar."""
+        """A variable's value: read-only array of the declared shape, or the parameter's scalar.
+
+        In initialization mode an output is what it would be if that ended now, which is where masters look for the
+        initial values of inputs (FMI 2.0.4, section 4.2.4); directions that were not given yet are guessed.
+
+        Raises
+        ------
+        InvalidInput, StepFailure
+            In initialization mode, as `exit_initialization_mode` would.
+        """
         variable = self.variable(name)
         if variable.causality is Causality.PARAMETER:
             return self._parameters.get(name, variable.start)
         if variable.causality is Causality.INPUT:
             return self._inputs[name] if name in self._inputs else self._default(variable)
-        self._require(Phase.STEPPING, Phase.TERMINATED)
+        self._require(Phase.INITIALIZATION, Phase.STEPPING, Phase.TERMINATED)
+        state = self._foresee() if self.phase is Phase.INITIALIZATION else self._state
         if isinstance(variable, Statistic):
-            return variable(self.output(variable.source.name, self._state))
-        return self.output(name, self._state)
+            return variable(self.output(variable.source.name, state))
+        return self.output(name, state)
 
     def parameters(self, group: type[Group]) -> Group:
         """The unit's values of one parameter group, as that frozen dataclass."""
@@ -250,6 +269,23 @@ class Unit(ABC):
     def _ramps(self) -> bool:
         declared = any(variable.name == INPUT_INTERPOLATION for variable in self.variables())
         return declared and self.get(INPUT_INTERPOLATION) == "linear"
+
+    def _foresee(self) -> State:
+        """The state in which the initialisation would end; kept until something is set."""
+        if self._foreseen is None:
+            given = self._inputs
+            guesses = [variable for variable in self.inputs() if variable.guess]
+            if any(np.array_equal(given[variable.name], self._default(variable)) for variable in guesses):
+                shapes = {variable: variable.shape(self.mesh) for variable in guesses}
+                self._inputs = given | {
+                    variable.name: frozen(np.broadcast_to(variable.guess, shape)) for variable, shape in shapes.items()
+                }
+            try:
+                self.prepare()
+                self._foreseen = self._sound(self.initial(self._inputs))
+            finally:
+                self._inputs = given
+        return self._foreseen
 
     # --- checks -------------------------------------------------------------------------------------------------------
 
