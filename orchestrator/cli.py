@@ -25,7 +25,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-ScenarioFile = Annotated[Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file.")]
+ScenarioFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file, or a system package (.ssp).")
+]
 Assignments = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a key of the scenario; may be repeated."),
@@ -39,7 +41,7 @@ def run(
     assignments: Assignments = None,
     participants: Annotated[
         str | None,
-        typer.Option(metavar="native|fmu", help="Call the units directly, or through FMUs (default)."),
+        typer.Option(metavar="native|fmu|fmu3", help="Call the units directly, or by FMI 2.0 (default) or FMI 3.0."),
     ] = None,
     fmu_dir: Annotated[Path | None, typer.Option(help="Where FMUs are built; default: a user cache.")] = None,
     resume: Annotated[
@@ -53,15 +55,17 @@ def run(
     from .run import run_scenario
 
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
-    scenario = load_scenario(file, overrides)
-    folder = output if output is not None else Path("results") / scenario.name
-    console = Console(stderr=True)
-    with _about(file):
-        try:
-            outcome = run_scenario(scenario, file.parent, folder, console, fmu_dir, resume)
-        except Interrupted as error:
-            print(f"interrupted; the results so far are in {folder}, to be continued with --resume", file=sys.stderr)
-            raise typer.Exit(INTERRUPTED + error.signal) from None
+    with _opened(file, overrides) as (scenario, base):
+        folder = output if output is not None else Path("results") / scenario.name
+        console = Console(stderr=True)
+        with _about(file):
+            try:
+                outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume)
+            except Interrupted as error:
+                print(
+                    f"interrupted; the results so far are in {folder}, to be continued with --resume", file=sys.stderr
+                )
+                raise typer.Exit(INTERRUPTED + error.signal) from None
     if figures:
         with console.status("drawing the figures"):
             draw_figures(outcome.folder)
@@ -73,24 +77,31 @@ def build(
     file: ScenarioFile,
     output: Annotated[Path, typer.Option(help="Where the FMUs go.")] = Path("fmus-built"),
     assignments: Assignments = None,
+    ssp: Annotated[bool, typer.Option("--ssp", help="A system package too, <name>.ssp, of SSP 1.0.")] = False,
+    osp: Annotated[bool, typer.Option("--osp", help="The system structure for libcosim too.")] = False,
+    container: Annotated[
+        bool, typer.Option("--container", help="The description for fmucontainer too, which makes one FMU of all.")
+    ] = False,
+    fmi: Annotated[
+        int, typer.Option("--fmi", min=2, max=3, help="FMI 2.0, or FMI 3.0, where a field is one array.")
+    ] = 2,
 ) -> None:
     """Build the FMU of every unit in a scenario: one <unit name>.fmu each, on the scenario's mesh."""
-    from shutil import copyfile
-    from tempfile import TemporaryDirectory
+    from .build import build_fmus, write_container_file, write_osp_files, write_package
 
-    from .participants.native import fmu_of_unit
-    from .run import checked_mesh, make_folder
-
-    scenario = load_scenario(file, assignments or [])
-    with _about(file):
-        mesh = checked_mesh(scenario, file.parent)
-        if mesh is None:
-            raise InputError("there is no unit to build; every participant is an FMU already")
-        make_folder(output, "--output")
-    with TemporaryDirectory(prefix="cosim-") as folder:
-        for unit in dict.fromkeys(entry.unit for entry in scenario.units.values() if entry.unit is not None):
-            built = fmu_of_unit(unit, mesh, Path(folder))
-            typer.echo(copyfile(built, output / built.name))
+    with _opened(file, assignments or []) as (scenario, base), _about(file):
+        if fmi == 3 and (ssp or osp or container):
+            raise InputError("--ssp, --osp and --container are for FMUs of FMI 2.0; leave --fmi 3 out")
+        built = build_fmus(scenario, base, output, may_be_none=ssp or osp or container, fmi=fmi)
+        for path in built.fmus.values():
+            typer.echo(path)
+        if ssp:
+            typer.echo(write_package(built))
+        if osp:
+            typer.echo(write_osp_files(built))
+        if container:
+            path = write_container_file(built)
+            typer.echo(f"{path}\nnow: fmucontainer -fmu-directory {output} -container {path.name}")
 
 
 @app.command()
@@ -98,9 +109,21 @@ def show(file: ScenarioFile, assignments: Assignments = None) -> None:
     """Say what a scenario builds, exchanges and solves, and what it does without; nothing is run."""
     from .run import show_scenario
 
-    scenario = load_scenario(file, assignments or [])
-    with _about(file):
-        typer.echo(show_scenario(scenario, file.parent))
+    with _opened(file, assignments or []) as (scenario, base), _about(file):
+        typer.echo(show_scenario(scenario, base))
+
+
+@contextmanager
+def _opened(file: Path, assignments: list[str]) -> Iterator[tuple[Scenario, Path]]:
+    """The scenario in `file`, and the folder that its paths are relative to."""
+    if file.suffix.lower() != ".ssp":
+        yield load_scenario(file, assignments), file.parent
+        return
+    # Imported here, so that scenarios do not wait for what reads packages.
+    from .system_package import open_package
+
+    with open_package(file, assignments, lambda text: typer.echo(f"note: {text}", err=True)) as opened:
+        yield opened
 
 
 @contextmanager

@@ -73,8 +73,8 @@ def run_scenario(
     resumed = read_checkpoint(output, scenario) if resume else None
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
-        participants = _participants(stack, scenario, base, mesh, fmu_dir)
-        connections = connect(participants, scenario.connections)
+        participants = make_participants(stack, scenario, base, mesh, fmu_dir)
+        connections = connect(participants, scenario.connections, scenario.connect_by_name)
         scheme, converged = build_scheme(scenario.coupling, participants, connections)
         master = build_master(scenario, participants, connections, scheme)
         ready = time.perf_counter()
@@ -145,14 +145,14 @@ def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -
     if mesh is not None:
         Probes(mesh, scenario.output.probes_mm)
     with ExitStack() as stack:
-        participants = _participants(stack, _local(scenario), base, mesh, fmu_dir)
-        connections = connect(participants, scenario.connections)
+        participants = make_participants(stack, called_directly(scenario), base, mesh, fmu_dir)
+        connections = connect(participants, scenario.connections, scenario.connect_by_name)
         scheme, _ = build_scheme(scenario.coupling, participants, connections)
         build_master(scenario, participants, connections, scheme)
         return describe(scenario, mesh, participants, connections)
 
 
-def _local(scenario: Scenario) -> Scenario:
+def called_directly(scenario: Scenario) -> Scenario:
     """The same with units called directly in this process: they show what their FMUs show."""
     run = scenario.run.model_copy(update={"participants": "native", "workers": None})
     return scenario.model_copy(update={"run": run})
@@ -186,8 +186,8 @@ def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
         return scene_mesh(scenario.scene, base)
 
 
-def _participants(
-    stack: ExitStack, scenario: Scenario, base: Path, mesh: Mesh | None, fmu_dir: Path | None
+def make_participants(
+    stack: ExitStack, scenario: Scenario, base: Path, mesh: Mesh | None, fmu_dir: Path | None = None
 ) -> dict[str, Participant]:
     """All participants, in this process or in workers, closed with the `stack`."""
     if fmu_dir is not None:

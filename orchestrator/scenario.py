@@ -196,12 +196,16 @@ class Output(_Section):
 
 
 class Scenario(_Section):
-    """A whole scenario."""
+    """A whole scenario.
+
+    `connections` are those that are written; with `connect_by_name` every other input is fed by the output of its name.
+    """
 
     name: Annotated[str, Field(pattern=_NAME)]
     scene: Scene | None = None
     units: Annotated[dict[Annotated[str, Field(pattern=_UNIT_NAME)], UnitEntry], Field(min_length=1)]
     connections: list[str] = Field(default_factory=list)
+    connect_by_name: bool = True
     coupling: Coupling = Coupling()
     run: Run = Run()
     output: Output = Output()
@@ -267,6 +271,11 @@ def load_scenario(path: Path, assignments: Sequence[str] = ()) -> Scenario:
         raise InputError(f"{path}: the file is empty; a scenario needs at least `name`, `scene` and `units`")
     if not isinstance(content, dict):
         raise InputError(f"{path}: a scenario is lines `key: value` with the keys {', '.join(Scenario.model_fields)}")
+    return checked(content, path, assignments)
+
+
+def checked(content: dict[str, Any], path: Path, assignments: Sequence[str] = ()) -> Scenario:
+    """The scenario of a file's `content`, changed by `assignments`; InputError begins with the file's `path`."""
     for assignment in assignments:
         _assign(content, assignment)
     try:

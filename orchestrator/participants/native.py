@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from ...fmus.cache import cached_fmu
 from ...units.errors import InvalidInput, StepFailure
 from ...units.geometry.registry import build as build_geometry
 from ...units.input_ramp import INPUT_INTERPOLATION
 from ...units.mesh import Mesh
+from ...units.mesh.archive import pack_mesh
 from ...units.mesh.file import read_mesh
 from ...units.mesh.places import Places
 from ...units.mesh.quality import signed_inverse_condition_number
@@ -28,6 +30,7 @@ __all__ = [
     "element_quality",
     "fmu_of_unit",
     "located",
+    "packed_mesh",
     "scene_mesh",
     "unit_ports",
 ]
@@ -41,6 +44,14 @@ def scene_mesh(scene: Scene, folder: Path) -> Mesh:
         return build_geometry(str(scene.geometry), scene.mesh_size_mm)
     except InvalidInput as error:
         raise InputError(str(error)) from None
+
+
+def packed_mesh(mesh: Mesh) -> bytes:
+    """The mesh as the content of a file that `scene.mesh` may name."""
+    with TemporaryDirectory(prefix="cosim-") as folder:
+        path = Path(folder) / "mesh.npz"
+        pack_mesh(mesh, path)
+        return path.read_bytes()
 
 
 def check_unit(unit: str, parameters: Parameters) -> None:

@@ -1,0 +1,103 @@
+"""A component of a system package as it is found: its element, its FMU, and what that declares."""
+
+import zipfile
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import fmpy
+from lxml import etree
+
+from ..fmus.layout import scalar_names
+from .errors import InputError
+from .package_file import inside, named
+from .participants.fmu_variables import real_fields
+from .participants.participant import Port
+from .unit_conversion import Measure
+
+_FMU = "application/x-fmu-sharedlibrary"
+_OTHERS = {
+    "application/x-ssp-definition": "a system description of its own",
+    "application/x-ssp-package": "a package of its own",
+}
+
+
+class Part:
+    """The component `element` of the package unpacked in `folder`; `unit` is its name in the scenario.
+
+    InputError if it is none that can be coupled: another kind of component, or no FMI 2.0 co-simulation FMU.
+    """
+
+    def __init__(self, element: Any, unit: str, folder: Path) -> None:
+        self.element, self.unit, self.label = element, unit, element.get("name")
+        kind = element.get("type", _FMU)
+        if kind != _FMU:
+            raise InputError(
+                f"component '{self.label}' is {_OTHERS.get(kind, f'of the type {kind}')}; only FMUs can be coupled"
+            )
+        if element.get("implementation", "any") == "ModelExchange":
+            raise InputError(f"component '{self.label}' is to be run by model exchange; only co-simulation is possible")
+        self.source = unquote(element.get("source"))
+        path = inside(folder, self.source, f"the FMU of component '{self.label}'")
+        self.description = _described(path, f"component '{self.label}': {self.source}")
+        self.variables = {variable.name: variable for variable in self.description.modelVariables}
+        self.path = path
+
+    @cached_property
+    def connectors(self) -> dict[str, Any]:
+        """The component's connectors by name."""
+        return {item.get("name"): item for item in named(self.element, "ssd:Connectors/ssd:Connector")}
+
+    @cached_property
+    def scalars(self) -> dict[str, tuple[Port, int]]:
+        """By the name of a Real input or output, the field that it is part of, and its place in that."""
+        return {
+            scalar: (field.port, place)
+            for fields in real_fields(self.path, self.description.modelVariables, {})
+            for field in fields
+            for place, scalar in enumerate(scalar_names(field.port.name, field.port.shape))
+        }
+
+    def measure(self, name: str) -> Measure | None:
+        """The unit of the variable `name`, its own or that of its type, if it has one."""
+        variable = self.variables[name]
+        declared = None if variable.declaredType is None else variable.declaredType.unit
+        unit = declared if variable.unit is None else variable.unit
+        return None if unit is None else self.measures.get(unit, Measure(unit))
+
+    def is_relative(self, name: str) -> bool:
+        """Whether the variable `name` is a difference, of temperatures for instance, which has no offset."""
+        declared = self.variables[name].declaredType
+        return name in self._relative or bool(declared is not None and declared.relativeQuantity)
+
+    @cached_property
+    def _relative(self) -> set[str]:
+        # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
+        with zipfile.ZipFile(self.path) as archive, archive.open("modelDescription.xml") as text:
+            found = etree.parse(text).iterfind(".//ScalarVariable/Real[@relativeQuantity]")
+            yes = (real.getparent().get("name") for real in found if real.get("relativeQuantity") in ("true", "1"))
+            return set(yes)
+
+    @cached_property
+    def measures(self) -> dict[str, Measure]:
+        """The units of measure that the FMU defines."""
+        return dict(self._measures())
+
+    def _measures(self) -> Iterator[tuple[str, Measure]]:
+        for unit in self.description.unitDefinitions:
+            base = unit.baseUnit
+            names = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
+            yield unit.name, Measure.of(unit.name, base and {name: getattr(base, name) for name in names})
+
+
+def _described(path: Path, what: str) -> Any:
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    # FMPy raises plain Exceptions, and those of zip and XML readers.
+    except Exception as error:
+        raise InputError(f"{what}: FMPy cannot read it as an FMU ({error})") from None
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        raise InputError(f"{what}: not an FMI 2.0 co-simulation FMU; replace it by one")
+    return description
