@@ -1,0 +1,71 @@
+"""What it costs to hand an FMU a field of 10 000 numbers and to read one: FMI 2.0 and FMI 3.0; prints a table."""
+
+import zipfile
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from unittest.mock import patch
+
+import numpy as np
+from cardiac_cosim.fmus import wrapper
+from cardiac_cosim.fmus.cache import cached_fmu
+from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
+from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.registry import UNITS
+from skfem import MeshTet
+
+_REPEATS = 200
+
+
+def _block() -> Mesh:
+    """A block of 10 000 nodes."""
+    grid = MeshTet.init_tensor(*(np.linspace(0.0, 20.0, count) for count in (20, 20, 25)))
+    points, cells = grid.p.T, grid.t.T
+    inverted = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0.0
+    return Mesh(points, np.where(inverted[:, None], cells[:, [0, 2, 1, 3]], cells))
+
+
+def _milliseconds(fmu: Path) -> tuple[float, float, float]:
+    """Medians of setting and of reading a field, in ms, and the seconds to make the participant."""
+    begin = perf_counter()
+    participant = FmuParticipant("active_stress", fmu, {})
+    made = perf_counter() - begin
+    try:
+        participant.begin()
+        participant.complete()
+        random = np.random.default_rng(0)
+        setting, reading = [], []
+        for number in range(_REPEATS):
+            potential = random.uniform(-80.0, 20.0, participant.inputs["potential"].shape)
+            begin = perf_counter()
+            participant.set("potential", potential)
+            setting.append(perf_counter() - begin)
+            # Without a step what is read would be what was read before.
+            participant.start(1e-3 * number, 1e-3)
+            begin = perf_counter()
+            participant.get("active_stress")
+            reading.append(perf_counter() - begin)
+    finally:
+        participant.close()
+    return 1e3 * median(setting), 1e3 * median(reading), made
+
+
+def _row(mesh: Mesh, fmi: int, binary: str) -> str:
+    with TemporaryDirectory() as folder:
+        path = cached_fmu(UNITS["active_stress"], mesh, Path(folder), fmi)
+        setting, reading, made = _milliseconds(path)
+        with zipfile.ZipFile(path) as archive:
+            size = archive.getinfo("modelDescription.xml").file_size
+    return f"| FMI {fmi}.0 | {binary} | {setting:.2f} | {reading:.2f} | {made:.2f} | {size / 1e3:.0f} |"
+
+
+if __name__ == "__main__":
+    block = _block()
+    print(f"| {block.nodes} numbers | binary | set, ms | get, ms | made in, s | description, kB |")
+    print("|---|---|---|---|---|---|")
+    if wrapper.library() is not None:
+        print(_row(block, 2, "ours"))
+    with patch.object(wrapper, "library", lambda: None):
+        print(_row(block, 2, "pythonfmu's"))
+    print(_row(block, 3, "pythonfmu3's"))
