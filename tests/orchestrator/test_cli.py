@@ -365,7 +365,7 @@ def test_a_damaged_mesh_is_refused_with_the_place_of_the_damage(
 @pytest.mark.parametrize("value", ["fmus", "NATIVE", "1", "{}"])
 def test_participants_of_no_kind(cosim: Cosim, small_scenario: Path, tmp_path: Path, value: str) -> None:
     ended = cosim("run", small_scenario, "--participants", value, "--output", tmp_path / "out")
-    _wrong(ended, "participants", value.strip("{}"), "'fmu' or 'native'")
+    _wrong(ended, "participants", value.strip("{}"), "'fmu', 'fmu3' or 'native'")
     assert not (tmp_path / "out").exists()
 
 
@@ -505,9 +505,20 @@ def test_an_fmu_of_another_mesh_does_not_fit(
         ("", ["broken.fmu", "cannot read it"]),
         ("<not xml", ["broken.fmu", "cannot read it"]),
         (
+            '<fmiModelDescription fmiVersion="1.0" modelName="a" modelIdentifier="a" guid="x" numberOfEventIndicators="0" '
+            'numberOfContinuousStates="0"><ModelVariables/><Implementation>'
+            "<CoSimulation_StandAlone><Capabilities/></CoSimulation_StandAlone></Implementation></fmiModelDescription>",
+            ["broken.fmu", "not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0"],
+        ),
+        (
+            '<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToken="x">'
+            '<ModelExchange modelIdentifier="a"/><ModelVariables/><ModelStructure/></fmiModelDescription>',
+            ["broken.fmu", "not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0"],
+        ),
+        (
             '<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToken="x">'
             '<CoSimulation modelIdentifier="a"/><ModelVariables/><ModelStructure/></fmiModelDescription>',
-            ["broken.fmu", "not an FMI 2.0 co-simulation FMU"],
+            ["extra", "cannot be instantiated"],
         ),
         ('<fmiModelDescription fmiVersion="2.0" modelName="a" guid="x"/>', ["broken.fmu"]),
         (
@@ -516,7 +527,16 @@ def test_an_fmu_of_another_mesh_does_not_fit(
             ["extra", "cannot be instantiated"],
         ),
     ],
-    ids=["no description", "empty", "no xml", "FMI 3", "no co-simulation", "no binary"],
+    ids=[
+        "no description",
+        "empty",
+        "no xml",
+        "FMI 1",
+        "FMI 3 for model exchange",
+        "FMI 3 without binary",
+        "no co-simulation",
+        "no binary",
+    ],
 )
 def test_a_broken_fmu(
     cosim: Cosim, small_scenario: Path, tmp_path: Path, description: str | None, words: list[str]
