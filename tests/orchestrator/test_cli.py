@@ -505,8 +505,8 @@ def test_an_fmu_of_another_mesh_does_not_fit(
         ("", ["broken.fmu", "cannot read it"]),
         ("<not xml", ["broken.fmu", "cannot read it"]),
         (
-            '<fmiModelDescription fmiVersion="1.0" modelName="a" modelIdentifier="a" guid="x" numberOfEventIndicators="0" '
-            'numberOfContinuousStates="0"><ModelVariables/><Implementation>'
+            '<fmiModelDescription fmiVersion="1.0" modelName="a" modelIdentifier="a" guid="x" '
+            'numberOfContinuousStates="0" numberOfEventIndicators="0"><ModelVariables/><Implementation>'
             "<CoSimulation_StandAlone><Capabilities/></CoSimulation_StandAlone></Implementation></fmiModelDescription>",
             ["broken.fmu", "not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0"],
         ),
