@@ -1,4 +1,4 @@
-"""What FMI costs: the baseline's first 60 ms with FMUs and by direct calls; prints the ratios."""
+"""What FMI costs: the baseline's first 60 ms with FMUs of both versions and by direct calls; prints the ratios."""
 
 from pathlib import Path
 from statistics import median
@@ -17,8 +17,11 @@ def _seconds(participants: str) -> float:
 
 
 if __name__ == "__main__":
-    _seconds("fmu")  # builds the FMUs and warms up
-    pairs = [(_seconds("native"), _seconds("fmu")) for _ in range(3)]
-    for native, fmu in pairs:
-        print(f"native {native:.2f} s, FMUs {fmu:.2f} s, ratio {fmu / native:.3f}")
-    print(f"median ratio {median(fmu / native for native, fmu in pairs):.3f}")
+    names = {"fmu": "FMI 2.0", "fmu3": "FMI 3.0"}
+    for kind in names:
+        _seconds(kind)  # builds the FMUs and warms up
+    rounds = [{kind: _seconds(kind) for kind in ("native", *names)} for _ in range(3)]
+    for seconds in rounds:
+        print(", ".join(f"{names.get(kind, kind)} {value:.2f} s" for kind, value in seconds.items()))
+    for kind, name in names.items():
+        print(f"median ratio {name} {median(seconds[kind] / seconds['native'] for seconds in rounds):.3f}")
