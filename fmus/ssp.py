@@ -105,9 +105,10 @@ def _component(system: System, component: Component) -> Any:
     )
     kinds = {"input": system.linked_inputs(component), "output": _visible_outputs(system, component)}
     connectors = [
-        _SSD.Connector({"name": scalar, "kind": kind}, _SSC.Real(_measured(component, component.unit_of(name, shape))))
+        _SSD.Connector({"name": scalar, "kind": kind}, _SSC.Real(measured))
         for kind, fields in kinds.items()
         for name, shape in fields.items()
+        for measured in [_measured(component, component.unit_of(name, shape))]
         for scalar in scalar_names(name, shape)
     ]
     if connectors:
