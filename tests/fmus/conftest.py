@@ -4,7 +4,7 @@ import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -129,13 +129,23 @@ def cases(tiny: Mesh) -> dict[str, Case]:
 
 
 @pytest.fixture(scope="session", params=["own", "pythonfmu"])
-def binary(request: pytest.FixtureRequest) -> Iterator[str]:
+def binary(request: pytest.FixtureRequest) -> str:
     """Whose wrapper the FMUs have that are built in a test; ours is compiled wherever the tests run."""
+    return str(request.param)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None, Any, Any]:
+    """A test of pythonfmu's binary, and its fixtures, build FMUs as if there were no other; no other test does."""
     assert wrapper.library() is not None
     with pytest.MonkeyPatch.context() as patch:
-        if request.param == "pythonfmu":
+        if isinstance(item, pytest.Function) and _parameters(item).get("binary") == "pythonfmu":
             patch.setattr(wrapper, "library", lambda: None)
-        yield request.param
+        return (yield)
+
+
+def _parameters(item: pytest.Function) -> dict[str, Any]:
+    return item.callspec.params if hasattr(item, "callspec") else {}
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +19,6 @@ from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
 _SOURCES = Path(wrapper.__file__).parent
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
-#: Kept from before any fixture of the session has FMUs built without it.
-_LIBRARY = wrapper.library
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _ours() -> Iterator[None]:
-    """The FMUs of this module have our wrapper, whatever the tests before it were about."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wrapper, "library", _LIBRARY)
-        yield
 
 
 @pytest.fixture(scope="module")
