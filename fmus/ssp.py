@@ -59,7 +59,7 @@ def write_ssp(
         add(archive, STRUCTURE, _text(_structure(system, annotation)))
         for component in system.components:
             if component.given:
-                add(archive, _parameter_file(component), _text(_parameter_set(component)))
+                add(archive, _parameter_file(component), _text(_parameter_set(component, system.name)))
         for fmu, name in system.files.items():
             add(archive, f"resources/{name}", fmu.read_bytes(), zipfile.ZIP_STORED)
         for name, content in (extra or {}).items():
@@ -182,10 +182,11 @@ def _measured(component: Component, unit: str | None) -> dict[str, str]:
 # --- parameters -------------------------------------------------------------------------------------------------------
 
 
-def _parameter_set(component: Component) -> Any:
+def _parameter_set(component: Component, name: str) -> Any:
+    """The values of `component`; the sets of a system have one name, because Ecos is asked for all of them by that."""
     values = list(component.values())
     root = _SSV.ParameterSet(
-        {"version": "1.0", "name": component.name},
+        {"version": "1.0", "name": name},
         _SSV.Parameters(*(_SSV.Parameter({"name": value.name}, _typed(component, value)) for value in values)),
     )
     root.extend(_units(_SSV, [(component, {value.unit for value in values if value.fmi_type == "Real"})]))

@@ -49,7 +49,7 @@ class Workshop:
     def run(self, command: list[str]) -> str:
         """Standard output of `command`, which has to end well."""
         done = subprocess.run(
-            command, cwd=self.folder, capture_output=True, text=True, timeout=120, stdin=subprocess.DEVNULL
+            command, cwd=self.folder, capture_output=True, text=True, timeout=300, stdin=subprocess.DEVNULL
         )
         assert done.returncode == 0, f"exit code {done.returncode}\n{command[-1]}\n{done.stdout}\n{done.stderr}"
         return done.stdout
