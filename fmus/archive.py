@@ -2,7 +2,7 @@
 
 import uuid
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,6 +17,13 @@ def add(archive: zipfile.ZipFile, name: str, content: bytes, compression: int = 
     member = zipfile.ZipInfo(name, _EPOCH)
     member.external_attr = _READABLE
     archive.writestr(member, content, compression)
+
+
+def write_archive(members: Mapping[str, bytes], destination: Path) -> None:
+    """Write an archive of `members`, by name, to the file `destination`, in one piece and compressed."""
+    with put_in_place(destination) as part, zipfile.ZipFile(part, "w") as archive:
+        for name in sorted(members):
+            add(archive, name, members[name])
 
 
 @contextmanager

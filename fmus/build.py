@@ -6,10 +6,8 @@ or pythonfmu's where that could not be compiled. The archive is compressed.
 """
 
 import hashlib
-import shutil
 import tempfile
 import uuid
-import zipfile
 from importlib.metadata import version
 from pathlib import Path
 
@@ -18,7 +16,9 @@ from ..units.mesh import Mesh
 from ..units.mesh.archive import pack_mesh
 from ..units.unit import Unit
 from . import wrapper
+from .archive import write_archive
 from .instance import MESH_FILE
+from .missing_package import MISSING_PACKAGE
 from .model_description import TOOL, model_description
 from .pythonfmu_build import pythonfmu_archive
 
@@ -26,10 +26,6 @@ from .pythonfmu_build import pythonfmu_archive
 _OWN_FILES = ("__init__.py", "instance.py", "layout.py", "messages.py", "slave.py")
 #: And what it needs besides where its binary is pythonfmu's.
 _PYTHONFMU_FILE = "pythonfmu_slave.py"
-#: The date of every archive member, so that the same content makes the same bytes.
-_EPOCH = (2020, 1, 1, 0, 0, 0)
-#: Permissions of every archive member; without them Unix unzippers extract files that nobody may read.
-_READABLE = 0o100644 << 16
 
 _LOADER = '''"""Loads the packaged code under a name that is its own."""
 
@@ -53,11 +49,7 @@ def instantiate(resources, guid):
         slave = importlib.import_module(PACKAGE + ".fmus.slave")
     except ModuleNotFoundError as error:
         del sys.modules[PACKAGE]
-        raise ImportError(
-            "this FMU needs the Python package '" + str(error.name).partition(".")[0] + "', which the Python "
-            + sys.version.split()[0] + " at " + sys.prefix + " does not have; install numpy, scipy, scikit-fem and "
-            "meshio there, or name another Python by the environment variable COSIM_PYTHON in hosts without one"
-        ) from None
+        {missing}
     return slave.Slave("{unit}", resources)
 '''
 
@@ -92,7 +84,6 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
     key = fingerprint(unit, mesh)
     guid = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, key)}}}"
     package, code = package_of(sources())
-    destination.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="cosim-build-") as folder:
         work = Path(folder)
         pack_mesh(mesh, work / MESH_FILE)
@@ -101,16 +92,14 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
             members = pythonfmu_archive(unit, key, package, code, work)
             tool = f"{TOOL} {version(TOOL)} with PythonFMU {version('pythonfmu')}"
         else:
-            loader = _LOADER.format(unit=unit.name, package=package, guid=guid)
+            loader = _LOADER.format(unit=unit.name, package=package, guid=guid, missing=MISSING_PACKAGE)
             members = {f"resources/{name}": content for name, content in code.items()}
             members |= {"resources/load.py": loader.encode()}
             members |= {f"resources/{MESH_FILE}": (work / MESH_FILE).read_bytes()}
             members |= {f"binaries/linux64/{unit.name}.so": library.read_bytes()}
             tool = f"{TOOL} {version(TOOL)}"
         members["modelDescription.xml"] = model_description(unit, mesh, guid, tool).encode()
-        finished = work / "finished.fmu"
-        write_archive(members, finished)
-        put(finished, destination)
+    write_archive(members, destination)
     return destination
 
 
@@ -121,22 +110,3 @@ def package_of(files: dict[str, bytes]) -> tuple[str, dict[str, bytes]]:
         digest.update(f"{name} {len(content)} ".encode() + content)
     package = f"cosim_{digest.hexdigest()[:16]}"
     return package, {f"{package}/{name}": content for name, content in files.items()}
-
-
-def write_archive(members: dict[str, bytes], path: Path) -> None:
-    """Write `members` to the archive `path`, compressed and with fixed dates: the same content makes the same bytes."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
-        for name in sorted(members):
-            member = zipfile.ZipInfo(name, _EPOCH)
-            member.external_attr = _READABLE
-            target.writestr(member, members[name], zipfile.ZIP_DEFLATED)
-
-
-def put(finished: Path, destination: Path) -> None:
-    """Copy `finished` to `destination` in one piece, whoever else does so now: nobody ever opens half an FMU."""
-    part = destination.with_name(f"{destination.stem}-{uuid.uuid4().hex}.part")
-    try:
-        shutil.copyfile(finished, part)
-        part.replace(destination)
-    finally:
-        part.unlink(missing_ok=True)

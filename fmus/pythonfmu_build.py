@@ -9,6 +9,7 @@ from pythonfmu.builder import FmuBuilder
 
 from ..units.unit import Unit
 from .instance import MESH_FILE
+from .missing_package import MISSING_PACKAGE
 
 _STUB = '''"""The {unit} unit as an FMU: loads the packaged code under a name that is its own."""
 
@@ -19,10 +20,7 @@ import pythonfmu
 try:
     from {package}.fmus.pythonfmu_slave import Fmi2Status, PythonFmuSlave
 except ModuleNotFoundError as error:
-    raise ImportError(
-        "this FMU needs the Python package '" + str(error.name).partition(".")[0] + "', which the Python "
-        + sys.version.split()[0] + " at " + sys.prefix + " does not have; install numpy, scipy, scikit-fem and meshio"
-    ) from None
+    {missing}
 
 
 class {name}(PythonFmuSlave):
@@ -49,7 +47,7 @@ def pythonfmu_archive(unit: type[Unit], key: str, package: str, code: dict[str, 
         path.write_bytes(content)
     script = work / f"{stub}.py"
     names = {"unit": unit.name, "package": package, "name": unit.__name__ + key[:16], "version": version("pythonfmu")}
-    script.write_text(_STUB.format(**names))
+    script.write_text(_STUB.format(**names, missing=MISSING_PACKAGE))
     path_before, modules_before = list(sys.path), set(sys.modules)
     try:
         plain = FmuBuilder.build_FMU(

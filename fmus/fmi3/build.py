@@ -16,7 +16,9 @@ from ...units.mesh.archive import pack_mesh
 from ...units.unit import Unit
 from .. import build as fmi2
 from ..annotations import TOOL
+from ..archive import write_archive
 from ..instance import MESH_FILE
+from ..missing_package import MISSING_PACKAGE
 from .model_description import model_description
 
 #: What an FMU carries of this folder, besides what one for FMI 2.0 does.
@@ -43,11 +45,7 @@ class {name}(Fmi3Slave):
         try:
             slave = _slave()
         except ModuleNotFoundError as error:
-            raise ImportError(
-                "this FMU needs the Python package '" + str(error.name).partition(".")[0] + "', which the Python "
-                + sys.version.split()[0] + " at " + sys.prefix + " does not have; install numpy, scipy, scikit-fem and "
-                "meshio there"
-            ) from None
+            {missing}
         return slave.Slave("{unit}", resources)
 
     @staticmethod
@@ -84,10 +82,9 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
     key = fingerprint(unit, mesh)
     package, code = fmi2.package_of(sources())
     stub = f"{unit.name}_{key[:16]}"
-    text = _STUB.format(unit=unit.name, package=package, name=unit.__name__ + key[:16])
+    text = _STUB.format(unit=unit.name, package=package, name=unit.__name__ + key[:16], missing=MISSING_PACKAGE)
     tool = f"{TOOL} {version(TOOL)} with PythonFMU3 {version('pythonfmu3')}"
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, key)}}}"
-    destination.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="cosim-build-") as folder:
         work = Path(folder)
         pack_mesh(mesh, work / MESH_FILE)
@@ -100,9 +97,7 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
             f"binaries/x86_64-linux/{unit.name}.so": _binary(),
             "documentation/licenses/pythonfmu3.txt": _license(),
         }
-        finished = work / "finished.fmu"
-        fmi2.write_archive(members, finished)
-        fmi2.put(finished, destination)
+    write_archive(members, destination)
     return destination
 
 

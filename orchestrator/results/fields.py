@@ -7,7 +7,8 @@ about hyperslabs (libxdmf3 takes the axes in reverse and shows wrong values with
 
 While a run goes on, the frames lie in `fields.parts/`, a file each, and fields.h5 has the same layout with references
 to them: an HDF5 file that is being written to is not readable any more when its process is killed. In the end all is
-copied into fields.h5.
+copied into fields.h5. Of runs with hundreds of frames it is not written anew for each, which would take a time that
+grows with the square of their number.
 """
 
 import os
@@ -33,11 +34,14 @@ _TOPOLOGIES = {
     3: {"TopologyType": "Tetrahedron"},
 }
 
+#: Frames that fields.h5 may lack while a run goes on, as a fraction of those it has.
+_BEHIND = 0.02
+
 _CENTERS = {"node": "Node", "element": "Cell"}
 
 
 class Fields:
-    """Writes a frame at every output time; both files are complete up to the last frame at every moment.
+    """Writes a frame at every output time; both files are complete up to the last frame, or nearly, at every moment.
 
     `resumed` is the `memory` of an earlier run in the same folder, after whose frames this one goes on.
     """
@@ -57,6 +61,8 @@ class Fields:
             remove_stale(self._xdmf)
         self._parts = Parts(folder / "fields.parts", 0 if resumed is None else int(resumed["frames"]))
         self._fixed: dict[str, Values] = {} if resumed is None else dict(resumed.get("fixed", {}))
+        # How many frames fields.h5 has or refers to.
+        self._referred = len(self._parts.times)
         if resumed is None:
             with writing(self._path):
                 self._write(self._copy)
@@ -69,8 +75,9 @@ class Fields:
             # All values are at hand before the first is written: a unit that fails here leaves no half a frame.
             values = {name: exchange.value(unit, port.name) for name, unit, port in self._named if not port.fixed}
             self._parts.add(step.time_ms, values)
-            self._write(self._refer)
-            self._write_xdmf()
+            if len(self._parts.times) >= (1.0 + _BEHIND) * self._referred:
+                self._write(self._refer)
+                self._write_xdmf()
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
@@ -80,6 +87,8 @@ class Fields:
         """Gather all frames in fields.h5; the parts stay, to go on from a checkpoint."""
         if self._open:
             self._write(self._copy)
+            if self._parts.times:
+                self._write_xdmf()
         self._open = False
 
     def forget(self) -> None:
@@ -88,6 +97,7 @@ class Fields:
 
     def _write(self, frames: Any) -> None:
         """Write fields.h5 anew, with the `frames` put in, and replace the old one by it."""
+        self._referred = len(self._parts.times)
         unfinished = self._path.with_suffix(".part")
         with h5py.File(unfinished, "w") as file:
             file["points_mm"] = self._mesh.points

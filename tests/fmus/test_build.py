@@ -1,17 +1,16 @@
 """If these fail, an FMU is stale, half written, not reproducible, or building it disturbs the program that builds."""
 
 import io
-import shutil
 import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from cardiac_cosim.fmus import archive as archives
 from cardiac_cosim.fmus import build, cache
 from cardiac_cosim.units import registry
 from cardiac_cosim.units.mesh import Mesh
@@ -134,15 +133,16 @@ def test_any_other_content_is_another_file(tiny: Mesh, monkeypatch: pytest.Monke
 
 
 def test_a_build_inside_a_build(tiny: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another process finishes the same file at the worst moment: when this one has written but not yet named it."""
+    """Another process finishes the same file while this one writes it."""
     destination = tmp_path / "same.fmu"
 
-    def interrupted(source: Path, target: Path) -> None:
-        shutil.copyfile(source, target)
-        monkeypatch.setattr(build, "shutil", shutil)
+    def interrupted(members: zipfile.ZipFile, name: str, content: bytes) -> None:
+        monkeypatch.setattr(archives, "add", add)
+        add(members, name, content)
         build.build_fmu(_UNIT, tiny, destination)
 
-    monkeypatch.setattr(build, "shutil", SimpleNamespace(copyfile=interrupted))
+    add = archives.add
+    monkeypatch.setattr(archives, "add", interrupted)
     build.build_fmu(_UNIT, tiny, destination)
     with zipfile.ZipFile(destination) as archive:
         assert archive.testzip() is None
@@ -180,11 +180,10 @@ def test_a_build_that_fails_leaves_the_old_file(tiny: Mesh, tmp_path: Path, monk
     destination = tmp_path / "old.fmu"
     destination.write_text("old")
 
-    def full(source: Path, target: Path) -> None:
-        target.write_text("half")
+    def full(members: zipfile.ZipFile, name: str, content: bytes) -> None:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(build, "shutil", SimpleNamespace(copyfile=full))
+    monkeypatch.setattr(archives, "add", full)
     with pytest.raises(OSError, match="no space"):
         build.build_fmu(_UNIT, tiny, destination)
     assert destination.read_text() == "old"
