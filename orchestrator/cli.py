@@ -120,7 +120,7 @@ def _opened(file: Path, assignments: list[str]) -> Iterator[tuple[Scenario, Path
         yield load_scenario(file, assignments), file.parent
         return
     # Imported here, so that scenarios do not wait for what reads packages.
-    from .system_package import open_package
+    from .ssp import open_package
 
     with open_package(file, assignments, lambda text: typer.echo(f"note: {text}", err=True)) as opened:
         yield opened

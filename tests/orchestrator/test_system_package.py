@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from cardiac_cosim.orchestrator import stopping
 from cardiac_cosim.orchestrator.errors import InputError
-from cardiac_cosim.orchestrator.system_package import open_package
+from cardiac_cosim.orchestrator.ssp import open_package
 from fmpy.ssp import simulation
 from fmpy.ssp.ssd import read_ssd
 

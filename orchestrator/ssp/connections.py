@@ -3,18 +3,18 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..fmus.ssp import NAMESPACES
-from .coupling.connections import Connection, End, Law
-from .errors import InputError, did_you_mean
-from .package_file import named
-from .package_part import Part
-from .participants.participant import Port
+from ...fmus.ssp import NAMESPACES
+from ..coupling.connections import Connection, End, Law
+from ..errors import InputError, did_you_mean
+from ..participants.participant import Port
+from .component import SystemComponent
+from .file import named
 from .unit_conversion import chained, conversion
 
 _TRANSFORMATIONS = ("BooleanMappingTransformation", "IntegerMappingTransformation", "EnumerationMappingTransformation")
 
 
-def connections(system: Any, parts: Sequence[Part]) -> Iterator[Connection]:
+def connections(system: Any, parts: Sequence[SystemComponent]) -> Iterator[Connection]:
     """The connections between fields.
 
     Raises
@@ -43,7 +43,9 @@ def connections(system: Any, parts: Sequence[Part]) -> Iterator[Connection]:
         yield Connection(start, end, laws.pop())
 
 
-def _ends(element: Any, parts: dict[str, Part]) -> tuple[tuple[Part, str], tuple[Part, str]]:
+def _ends(
+    element: Any, parts: dict[str, SystemComponent]
+) -> tuple[tuple[SystemComponent, str], tuple[SystemComponent, str]]:
     """Output and input of a connection, whichever of them it starts with."""
     ends = {}
     for side in ("start", "end"):
@@ -69,7 +71,7 @@ def _ends(element: Any, parts: dict[str, Part]) -> tuple[tuple[Part, str], tuple
     return ends["output"], ends["input"]
 
 
-def _check(part: Part, name: str, kind: str) -> None:
+def _check(part: SystemComponent, name: str, kind: str) -> None:
     """InputError if the connector cannot be coupled, or is not what its FMU says."""
     if kind not in ("input", "output"):
         raise InputError(
@@ -89,7 +91,7 @@ def _check(part: Part, name: str, kind: str) -> None:
         )
 
 
-def _law(element: Any, source: tuple[Part, str], target: tuple[Part, str]) -> Law | None:
+def _law(element: Any, source: tuple[SystemComponent, str], target: tuple[SystemComponent, str]) -> Law | None:
     for name in _TRANSFORMATIONS:
         if element.find(f"ssc:{name}", NAMESPACES) is not None:
             raise InputError(

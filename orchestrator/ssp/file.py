@@ -11,8 +11,8 @@ from urllib.parse import unquote
 import fmpy
 from lxml import etree
 
-from ..fmus.ssp import NAMESPACES, STRUCTURE
-from .errors import InputError
+from ...fmus.ssp import NAMESPACES, STRUCTURE
+from ..errors import InputError
 
 _SCHEMAS = {"ssd": "SystemStructureDescription.xsd", "ssv": "SystemStructureParameterValues.xsd"}
 

@@ -6,8 +6,8 @@ A value v in a unit is factor · v + offset in base units.
 from dataclasses import dataclass
 from typing import Any
 
-from .coupling.connections import Law
-from .errors import InputError
+from ..coupling.connections import Law
+from ..errors import InputError
 
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 

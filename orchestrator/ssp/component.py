@@ -10,11 +10,11 @@ from urllib.parse import unquote
 import fmpy
 from lxml import etree
 
-from ..fmus.layout import scalar_names
-from .errors import InputError
-from .package_file import inside, named
-from .participants.fmu_variables import real_fields
-from .participants.participant import Port
+from ...fmus.layout import scalar_names
+from ..errors import InputError
+from ..participants.fmu_variables import real_fields
+from ..participants.participant import Port
+from .file import inside, named
 from .unit_conversion import Measure
 
 _FMU = "application/x-fmu-sharedlibrary"
@@ -24,7 +24,7 @@ _OTHERS = {
 }
 
 
-class Part:
+class SystemComponent:
     """The component `element` of the package unpacked in `folder`; `unit` is its name in the scenario.
 
     InputError if it is none that can be coupled: another kind of component, or no FMI 2.0 co-simulation FMU.

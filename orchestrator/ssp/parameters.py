@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ..fmus.ssp import NAMESPACES
-from .errors import InputError
-from .package_file import check, inside, named, read
-from .package_part import Part
+from ...fmus.ssp import NAMESPACES
+from ..errors import InputError
+from .component import SystemComponent
+from .file import check, inside, named, read
 from .unit_conversion import Measure, conversion
 
 _SET = "application/x-ssp-parameter-set"
@@ -32,7 +32,7 @@ class _Entry:
     unit: Measure | None
 
 
-def parameters(system: Any, parts: Sequence[Part], folder: Path, tell: Callable[[str], None]) -> Given:
+def parameters(system: Any, parts: Sequence[SystemComponent], folder: Path, tell: Callable[[str], None]) -> Given:
     """All values for the variables of `parts`; names that nobody has are told to `tell`."""
     given: Given = {part.unit: {} for part in parts}
     for part in parts:
@@ -94,7 +94,7 @@ def _entry(parameter: Any, prefix: str, units: dict[str, Measure], where: str) -
     return _Entry(name, kind, value.get("value"), None if unit is None else units.get(unit, Measure(unit)))
 
 
-def _value(entry: _Entry, part: Part, name: str) -> Any:
+def _value(entry: _Entry, part: SystemComponent, name: str) -> Any:
     """The value in the type and unit of the variable `name` of `part`."""
     variable = part.variables[name]
     if entry.kind == "Enumeration":

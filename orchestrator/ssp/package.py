@@ -9,13 +9,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..fmus.ssp import ANNOTATION
-from .errors import InputError
-from .package_connections import connections
-from .package_file import named, unpack
-from .package_parameters import parameters
-from .package_part import Part
-from .scenario import Scenario, checked
+from ...fmus.ssp import ANNOTATION
+from ..errors import InputError
+from ..scenario import Scenario, checked
+from .component import SystemComponent
+from .connections import connections
+from .file import named, unpack
+from .parameters import parameters
 
 _MS_PER_S = 1000.0
 
@@ -83,8 +83,8 @@ def _content(root: Any, folder: Path, tell: Callable[[str], None]) -> dict[str, 
     return content | _times(root, parts) | own_content
 
 
-def _parts(system: Any, folder: Path) -> list[Part]:
-    parts: list[Part] = []
+def _parts(system: Any, folder: Path) -> list[SystemComponent]:
+    parts: list[SystemComponent] = []
     for element in named(system, "ssd:Elements/ssd:Component"):
         unit = _identifier(element.get("name"), r"\W")
         for other in parts:
@@ -92,7 +92,7 @@ def _parts(system: Any, folder: Path) -> list[Part]:
                 raise InputError(
                     f"components '{other.label}' and '{element.get('name')}' have too similar names; rename one"
                 )
-        parts.append(Part(element, unit, folder))
+        parts.append(SystemComponent(element, unit, folder))
     if not parts:
         raise InputError("the system has no components, so there is nothing to run")
     return parts
@@ -104,7 +104,7 @@ def _identifier(name: str, forbidden: str) -> str:
     return plain if plain[:1].isalpha() else f"x{plain}"
 
 
-def _times(root: Any, parts: Sequence[Part]) -> dict[str, Any]:
+def _times(root: Any, parts: Sequence[SystemComponent]) -> dict[str, Any]:
     """The run as the package has it, with the smallest step that an FMU proposes, or a hundredth of the whole."""
     experiment = next(named(root, "ssd:DefaultExperiment"), None)
     start, stop = (None if experiment is None else experiment.get(key) for key in ("startTime", "stopTime"))

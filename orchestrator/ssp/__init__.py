@@ -1,0 +1,5 @@
+"""System packages (SSP 1.0) as scenarios."""
+
+from .package import open_package
+
+__all__ = ["open_package"]
