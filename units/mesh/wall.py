@@ -38,7 +38,7 @@ def wall_of(mesh: Mesh) -> Wall:
     Raises
     ------
     InvalidInput
-        Where a left ventricle has faces without a name, which may be those of a right one.
+        Where a left ventricle has other faces than its own, which may be those of a right one.
     """
     if "endocardium" in mesh.boundaries:
         wall = _PIECE
@@ -47,11 +47,12 @@ def wall_of(mesh: Mesh) -> Wall:
     else:
         wall = _LEFT_VENTRICLE
     if wall is _LEFT_VENTRICLE and {*wall.endocardium, *wall.epicardium} <= set(mesh.boundaries):
-        nameless = len(mesh.surface) - sum(map(len, mesh.boundaries.values()))
-        if nameless:
+        own = ("base", *wall.endocardium, *wall.epicardium)
+        others = len(mesh.surface) - sum(len(mesh.boundaries[name]) for name in own if name in mesh.boundaries)
+        if others:
             raise InvalidInput(
-                f"the mesh has no boundary named 'rv_endocardium' or 'rv_septum', and {nameless} faces of its surface "
-                "have no name; name those of the right ventricle so, or, where there is none, complete base, "
-                "epicardium and lv_endocardium"
+                f"the mesh has no boundary named 'rv_endocardium' or 'rv_septum', and {others} faces of its surface are "
+                f"none of {', '.join(own)}; name those of the right ventricle so, or, where there is none, give all "
+                "faces to these three"
             )
     return wall
