@@ -51,8 +51,8 @@ def wall_of(mesh: Mesh) -> Wall:
         others = len(mesh.surface) - sum(len(mesh.boundaries[name]) for name in own if name in mesh.boundaries)
         if others:
             raise InvalidInput(
-                f"the mesh has no boundary named 'rv_endocardium' or 'rv_septum', and {others} faces of its surface are "
-                f"none of {', '.join(own)}; name those of the right ventricle so, or, where there is none, give all "
-                "faces to these three"
+                f"the mesh has no boundary named 'rv_endocardium' or 'rv_septum', and {others} faces of its surface "
+                f"are none of {', '.join(own)}; name those of the right ventricle so, or, where there is none, give "
+                "all faces to these three"
             )
     return wall
