@@ -15,7 +15,8 @@ class Fmi2Calls:
     """See Calls."""
 
     def __init__(self, description: Any) -> None:
-        self._description = description
+        # Not the description itself: that of a heart holds some ten thousand variables.
+        self._guid, self._model = description.guid, description.coSimulation.modelIdentifier
         self._slave: Any = None
         self.log = Fmi2Log(formats=not _gives_texts(description.generationTool or ""))
         self.takes_derivatives = bool(description.coSimulation.canInterpolateInputs)
@@ -23,9 +24,9 @@ class Fmi2Calls:
     def instantiate(self, folder: Path, name: str) -> None:
         """See Calls."""
         slave = FMU2Slave(
-            guid=self._description.guid,
+            guid=self._guid,
             unzipDirectory=str(folder),
-            modelIdentifier=self._description.coSimulation.modelIdentifier,
+            modelIdentifier=self._model,
             instanceName=name,
         )
         try:

@@ -21,16 +21,17 @@ class Fmi3Calls:
     takes_derivatives = False
 
     def __init__(self, description: Any) -> None:
-        self._description = description
+        # Not the description itself: that of a heart holds some ten thousand variables.
+        self._guid, self._model = description.guid, description.coSimulation.modelIdentifier
         self._slave: Any = None
         self.log = FmuLog()
 
     def instantiate(self, folder: Path, name: str) -> None:
         """See Calls."""
         slave = FMU3Slave(
-            guid=self._description.guid,
+            guid=self._guid,
             unzipDirectory=str(folder),
-            modelIdentifier=self._description.coSimulation.modelIdentifier,
+            modelIdentifier=self._model,
             instanceName=name,
         )
         slave.instantiate(loggingOn=True, logMessage=self._hear)

@@ -4,6 +4,7 @@ Fields live in buffers that are made once and handed to the raw FMI calls (see `
 ten times as much. What the two versions of FMI call differently is in `fmi2_calls` and `fmi3_calls`.
 """
 
+import gc
 import shutil
 import sys
 import tempfile
@@ -112,7 +113,7 @@ class FmuParticipant:
         self._calls: Calls | None = None
         self._initialized = False
         self._folder: Path | None = None
-        with self._naming(path):
+        with self._naming(path), _no_collection():
             description = _read(path)
             if ramps and declares_ramps(description.modelVariables):
                 parameters = {INPUT_INTERPOLATION: "linear"} | parameters
@@ -325,6 +326,18 @@ def _extract(path: Path, folder: Path) -> None:
     # What zip readers raise on a damaged member, and FMPy's plain Exception for an illegal path.
     except Exception as error:
         raise InputError(f"the FMU cannot be extracted ({error})") from None
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Python's collector would go through the ten thousand variables of a heart again and again while they are read."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def _read(path: Path) -> Any:

@@ -35,7 +35,7 @@ _TOPOLOGIES = {
 }
 
 #: Frames that fields.h5 may lack while a run goes on, as a fraction of those it has.
-_BEHIND = 0.02
+_BEHIND = 0.1
 
 _CENTERS = {"node": "Node", "element": "Cell"}
 
