@@ -97,9 +97,8 @@ def _row(mesh: Mesh, fmi: int, binary: str) -> str:
 
 if __name__ == "__main__":
     block = _block()
-    print(
-        f"| {block.nodes} numbers | binary | set, ms | get, ms | a step of the heart, ms | made in, s | description, kB |"
-    )
+    columns = ("binary", "set, ms", "get, ms", "a step of the heart, ms", "made in, s", "description, kB")
+    print(f"| {block.nodes} numbers | {' | '.join(columns)} |")
     print("|---|---|---|---|---|---|---|")
     if wrapper.library() is not None:
         print(_row(block, 2, "ours"))
