@@ -4,7 +4,6 @@ Fields live in buffers that are made once and handed to the raw FMI calls (see `
 ten times as much. What the two versions of FMI call differently is in `fmi2_calls` and `fmi3_calls`.
 """
 
-import gc
 import shutil
 import sys
 import tempfile
@@ -22,6 +21,7 @@ from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError
 from .fmi2_calls import Fmi2Calls
 from .fmi3_calls import Fmi3Calls
+from .fmu_description import read_description
 from .fmu_log import FmuLog
 from .fmu_variables import (
     Field,
@@ -113,8 +113,10 @@ class FmuParticipant:
         self._calls: Calls | None = None
         self._initialized = False
         self._folder: Path | None = None
-        with self._naming(path), _no_collection():
-            description = _read(path)
+        with self._naming(path):
+            description = read_description(path)
+            if description.fmiVersion[:3] not in _CALLS or description.coSimulation is None:
+                raise InputError("not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0")
             if ramps and declares_ramps(description.modelVariables):
                 parameters = {INPUT_INTERPOLATION: "linear"} | parameters
             check_parameters(parameters, description.modelVariables)
@@ -326,29 +328,3 @@ def _extract(path: Path, folder: Path) -> None:
     # What zip readers raise on a damaged member, and FMPy's plain Exception for an illegal path.
     except Exception as error:
         raise InputError(f"the FMU cannot be extracted ({error})") from None
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Python's collector would go through the ten thousand variables of a heart again and again while they are read."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
-
-
-def _read(path: Path) -> Any:
-    """FMPy's model description of the FMU at `path`."""
-    if not path.is_file():
-        raise InputError("no such FMU")
-    try:
-        description = fmpy.read_model_description(str(path), validate=False)
-    # FMPy raises plain Exceptions, and those of zip and XML readers.
-    except Exception as error:
-        raise InputError(f"FMPy cannot read it as an FMU ({error})") from None
-    if description.fmiVersion[:3] not in _CALLS or description.coSimulation is None:
-        raise InputError("not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0")
-    return description
