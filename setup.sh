@@ -9,7 +9,7 @@ cd "$(dirname "$0")"
 # Python, and for the tests, which build FMUs and a host in C and mesh the heart, a compiler and the shared libraries that gmsh's
 # and ecospy's wheels, and hosts without Python, leave to the system.
 packages="python3 python3-venv"
-[ "${1:-}" = test ] && packages="$packages gcc libc6-dev libgl1 libglu1-mesa libgomp1 libpython3-dev libtbb12 libxcursor1 libxft2 libxinerama1"
+[ "${1:-}" = test ] && packages="$packages gcc libc6-dev libgl1 libglu1-mesa libgomp1 libpython3-dev libtbb12 libxcursor1 libxft2 libxinerama1 unzip"
 
 missing=""
 if command -v dpkg-query >/dev/null; then
