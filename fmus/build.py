@@ -8,6 +8,7 @@ or pythonfmu's where that could not be compiled. The archive is compressed.
 import hashlib
 import tempfile
 import uuid
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -68,12 +69,18 @@ def sources() -> dict[str, bytes]:
 
 def fingerprint(unit: type[Unit], mesh: Mesh) -> str:
     """A hash of all that decides what the FMU of `unit` on `mesh` holds."""
-    digest = hashlib.sha256(f"{unit.name} {version(TOOL)}".encode())
     library = wrapper.library()
-    digest.update(f"pythonfmu {version('pythonfmu')}".encode() if library is None else library.read_bytes())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    binary = f"pythonfmu {version('pythonfmu')}".encode() if library is None else library.read_bytes()
+    head = f"{unit.name} {version(TOOL)}".encode() + binary
+    return content_hash(head, Path(__file__).parent.glob("*.py"), sources(), mesh)
+
+
+def content_hash(head: bytes, builders: Iterable[Path], files: dict[str, bytes], mesh: Mesh) -> str:
+    """A hash of `head`, of the code that builds an FMU, and of the code and the mesh that it carries."""
+    digest = hashlib.sha256(head)
+    for path in sorted(builders):
         digest.update(path.read_bytes())
-    for name, content in sources().items():
+    for name, content in files.items():
         digest.update(name.encode() + content)
     digest.update(mesh.fingerprint.encode())
     return digest.hexdigest()

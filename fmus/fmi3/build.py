@@ -4,7 +4,6 @@ The FMU carries the code of the units under a private, hashed name, as the FMI 2
 is that of pythonfmu3.
 """
 
-import hashlib
 import tempfile
 import uuid
 from importlib.metadata import distribution, version
@@ -67,14 +66,9 @@ def sources() -> dict[str, bytes]:
 
 def fingerprint(unit: type[Unit], mesh: Mesh) -> str:
     """A hash of all that decides what the FMI 3.0 FMU of `unit` on `mesh` holds."""
-    digest = hashlib.sha256(f"FMI 3.0 {unit.name} {version(TOOL)} pythonfmu3 {version('pythonfmu3')}".encode())
+    head = f"FMI 3.0 {unit.name} {version(TOOL)} pythonfmu3 {version('pythonfmu3')}".encode()
     own = Path(__file__).parent
-    for path in sorted([*own.glob("*.py"), *own.parent.glob("*.py")]):
-        digest.update(path.read_bytes())
-    for name, content in sources().items():
-        digest.update(name.encode() + content)
-    digest.update(mesh.fingerprint.encode())
-    return digest.hexdigest()
+    return fmi2.content_hash(head, [*own.glob("*.py"), *own.parent.glob("*.py")], sources(), mesh)
 
 
 def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
