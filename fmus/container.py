@@ -5,7 +5,6 @@ The tool takes scalars `x[1]`, …, `x[N]` together as the array `x`, so that on
 
 import json
 from pathlib import Path
-from shutil import copyfile
 from typing import Any
 
 from .archive import put_in_place
@@ -26,9 +25,7 @@ def write_container(system: System, folder: Path) -> Path:
     system.require_plain_links("fmu-manipulation-toolbox")
     # The tool knows an FMU by a file name: a second instance is given one of its own, and the file that it stands for.
     names = {component.name: _instance(system, component) for component in system.components}
-    for fmu, name in system.files.items():
-        with put_in_place(folder / name) as part:
-            copyfile(fmu, part)
+    system.copy_fmus(folder)
     content: dict[str, Any] = {
         "name": f"{system.name}_container.fmu",
         "step_size": system.step_s,

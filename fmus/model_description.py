@@ -7,7 +7,6 @@ the empty list.
 """
 
 from collections.abc import Iterator
-from importlib.metadata import version
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -19,8 +18,8 @@ from ..units.unit import Unit
 from ..units.variable import Causality, Location
 from .annotations import TOOL as TOOL
 from .annotations import annotations
+from .description_head import default_experiment, log_categories, origin
 from .layout import Run, layout
-from .messages import INVALID_INPUT
 from .unit_definitions import unit_definitions
 from .xml_tag import tag
 
@@ -45,20 +44,13 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
                 fmiVersion="2.0",
                 modelName=unit.name,
                 guid=guid,
-                description=(unit.__doc__ or "").splitlines()[0],
-                version=version(TOOL),
-                license="BSD-3-Clause",
-                generationTool=tool,
-                variableNamingConvention="structured",
+                **origin(unit, tool),
+                end=False,
             ),
             tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
             *unit_definitions(unit),
-            "<LogCategories>",
-            tag("Category", name="logStatusWarning", description="Messages with the status fmi2Warning", end=True),
-            tag("Category", name="logStatusError", description="Messages with the status fmi2Error", end=True),
-            tag("Category", name=INVALID_INPUT, description="Errors in what the caller gave", end=True),
-            "</LogCategories>",
-            tag("DefaultExperiment", startTime="0", stopTime="0.32", stepSize="0.001", end=True),
+            *log_categories(2),
+            default_experiment(),
             "<VendorAnnotations>",
             tag("Tool", name=TOOL),
             *annotations(unit),

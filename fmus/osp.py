@@ -6,7 +6,6 @@ what the groups of an FMU are: here one for every field. That is the fast way of
 
 from collections.abc import Iterator
 from pathlib import Path
-from shutil import copyfile
 from typing import Any
 
 from lxml import etree
@@ -43,9 +42,7 @@ def write_osp(system: System, folder: Path) -> Path:
                 f"the FMUs of '{first.name}' and '{component.name}' are both called "
                 f"{component.description.modelName} (modelName), and libcosim tells FMUs apart by that"
             )
-    for fmu, name in system.files.items():
-        with put_in_place(folder / name) as part:
-            copyfile(fmu, part)
+    system.copy_fmus(folder)
     for model, component in models.items():
         _write(_groups(component), folder / f"{model}_OspModelDescription.xml")
     return _write(_structure(system), folder / STRUCTURE)

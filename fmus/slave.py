@@ -12,7 +12,7 @@ import numpy as np
 
 from ..units.snapshot import Snapshot
 from .instance import UnitInstance
-from .messages import REFUSED, WARNING_CATEGORY, category, message
+from .messages import ERROR_CATEGORY, REFUSED, WARNING_CATEGORY, category, message
 
 #: fmi2Status.
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
@@ -168,7 +168,7 @@ class Slave:
     def _guarded(self, call: Callable[[], None], refusing: str = "call") -> Answer:
         """`call`, unless an earlier one failed; `refusing` is what the host is told to be refused then."""
         if self._failed:
-            return ERROR, None, [(ERROR, category(Exception()), REFUSED.format(call=refusing))]
+            return ERROR, None, [(ERROR, ERROR_CATEGORY, REFUSED.format(call=refusing))]
         try:
             call()
         except Exception as error:

@@ -4,11 +4,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from shutil import copyfile
 from typing import Any
 
 import fmpy
 
 from ..units.errors import InvalidInput
+from .archive import put_in_place
 from .layout import scalar_names
 
 Shape = tuple[int, ...]
@@ -111,6 +113,12 @@ class System:
                 free = component.fmu.name not in taken.values()
                 taken[component.fmu] = component.fmu.name if free else f"{component.name}-{component.fmu.name}"
         return taken
+
+    def copy_fmus(self, folder: Path) -> None:
+        """Put every FMU into `folder`, under its name among `files`."""
+        for fmu, name in self.files.items():
+            with put_in_place(folder / name) as part:
+                copyfile(fmu, part)
 
     def component(self, name: str) -> Component:
         """The component `name`."""

@@ -8,14 +8,13 @@ pointwise output follows its inputs at its own place only has no place in it.
 """
 
 from collections.abc import Iterator
-from importlib.metadata import version
 from xml.sax.saxutils import quoteattr
 
 from ...units.mesh import Mesh
 from ...units.unit import Unit
 from ...units.variable import Causality
 from ..annotations import TOOL, annotations
-from ..messages import INVALID_INPUT
+from ..description_head import default_experiment, log_categories, origin
 from ..unit_definitions import unit_definitions
 from ..xml_tag import tag
 from .layout import TIME, Entry, layout
@@ -41,20 +40,13 @@ def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> st
                 fmiVersion="3.0",
                 modelName=unit.name,
                 instantiationToken=token,
-                description=(unit.__doc__ or "").splitlines()[0],
-                version=version(TOOL),
-                license="BSD-3-Clause",
-                generationTool=tool,
-                variableNamingConvention="structured",
+                **origin(unit, tool),
+                end=False,
             ),
             tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
             *unit_definitions(unit, "s"),
-            "<LogCategories>",
-            tag("Category", name="logStatusWarning", description="Messages with the status fmi3Warning", end=True),
-            tag("Category", name="logStatusError", description="Messages with the status fmi3Error", end=True),
-            tag("Category", name=INVALID_INPUT, description="Errors in what the caller gave", end=True),
-            "</LogCategories>",
-            tag("DefaultExperiment", startTime="0", stopTime="0.32", stepSize="0.001", end=True),
+            *log_categories(3),
+            default_experiment(),
             "<ModelVariables>",
             tag(
                 "Float64",

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..messages import REFUSED, WARNING_CATEGORY, category, message
+from ..messages import ERROR_CATEGORY, REFUSED, WARNING_CATEGORY, category, message
 from ..slave import DISCARD, ERROR, NO_INTEGER, OK, WARNING
 from .instance import ArrayInstance, State
 
@@ -66,7 +66,7 @@ class Slave:
         """fmi3DoStep: fmi3Discard with the reason in the log, and the unit's state as before, if it fails."""
         self._guarded(lambda: self._instance.prepare_step(current_time), None)
         if self._failed:
-            self._log(ERROR, category(Exception()), REFUSED.format(call="step"))
+            self._log(ERROR, ERROR_CATEGORY, REFUSED.format(call="step"))
             return StepResult(ERROR)
         try:
             self._instance.do_step(current_time, step_size)
