@@ -147,13 +147,22 @@ def _report(scenario: Scenario, folder: Path, summary: dict[str, Any]) -> None:
         )
     lines.append(f"  results in {folder}")
     typer.echo("\n".join(lines))
-    late = summary["unconverged_ms"]
+    late, missed = summary["unconverged_ms"], summary["tolerance_missed"]
     if late:
-        typer.echo(
-            f"warning: {len(late)} of {summary['steps']} steps were accepted without having converged, the first at "
-            f"{late[0]:g} ms; see the residuals in {folder / 'coupling.csv'}",
-            err=True,
+        _warn(
+            f"{len(late)} of {summary['steps']} steps were accepted without having converged, the first at "
+            f"{late[0]:g} ms; see the residuals in {folder / 'coupling.csv'}"
         )
+    if missed["steps"]:
+        _warn(
+            f"{missed['steps']} of {summary['steps']} steps missed the tolerance of coupling.adaptive, because none is "
+            f"shorter than min_ms, the first at {missed['first_ms']:g} ms; see the column `error` in "
+            f"{folder / 'coupling.csv'}, and lower `min_ms` or raise `tolerance`"
+        )
+
+
+def _warn(text: str) -> None:
+    typer.echo(f"warning: {text}", err=True)
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Any
 
 
 class InputError(Exception):
@@ -9,7 +10,17 @@ class InputError(Exception):
 
 
 class RunError(Exception):
-    """The physics or the coupling failed (exit code 3). The message says which unit, when, why and what to try."""
+    """The physics or the coupling failed (exit code 3). The message says which unit, when, why and what to try.
+
+    `sweeps` is the history of the loops of a step that was not accepted, if it was iterated, and `time_ms` its end.
+    """
+
+    sweeps: Any = None
+    time_ms: float | None = None
+
+
+class Terminated(RunError):
+    """A unit asked for the end of the simulation before its time."""
 
 
 class Interrupted(Exception):
@@ -30,11 +41,22 @@ class ParticipantError(Exception):
 
 
 class ParticipantLost(ParticipantError):
-    """A participant is gone for good: its process died, or it did not come back in time."""
+    """A participant is gone for good: its process died, it did not come back in time, or FMI forbids further calls."""
+
+
+class ParticipantTerminated(ParticipantError):
+    """A participant asks for the end of the simulation."""
 
 
 class NotConverged(Exception):
-    """The iteration of a loop found no solution of the step; the master adds when it was."""
+    """The iteration of a loop found no solution of the step; the master adds when it was.
+
+    `sweeps` is the history of the step's loops, this one included.
+    """
+
+    def __init__(self, message: str, sweeps: Any) -> None:
+        super().__init__(message)
+        self.sweeps = sweeps
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

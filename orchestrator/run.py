@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -94,10 +94,11 @@ def run_scenario(
         if fields is not None:
             recorders["fields"] = fields
         series = TimeSeries(output, participants, probes, before.get("series"))
-        log = CouplingLog(output, master.units, converged, before.get("log"))
+        adaptive = scenario.coupling.adaptive is not None
+        log = CouplingLog(output, master.units, list(converged), adaptive, before.get("log"))
         recorders |= {"series": series, "log": log}
         if converged:
-            recorders["iterations"] = IterationLog(output, converged, before.get("iterations"))
+            recorders["iterations"] = IterationLog(output, list(converged), before.get("iterations"))
         for recorder in recorders.values():
             stack.enter_context(closing(recorder))
         profile = stack.enter_context(closing(Profile(output, list(participants))))
@@ -132,7 +133,11 @@ def run_scenario(
             for recorder in recorders.values():
                 recorder.close()
             resumable = keeps and outcome["status"] != "done"
-            outcome |= {"unconverged_ms": log.unconverged, "resumable": resumable}
+            outcome |= {
+                "unconverged_ms": log.unconverged,
+                "tolerance_missed": asdict(master.missed),
+                "resumable": resumable,
+            }
             summary = write_summary(output / "summary.json", scenario, series, wall.seconds(), outcome)
             if not resumable:
                 _forget(checkpoint, fields)
@@ -147,9 +152,9 @@ def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -
     with ExitStack() as stack:
         participants = make_participants(stack, called_directly(scenario), base, mesh, fmu_dir)
         connections = connect(participants, scenario.connections, scenario.connect_by_name)
-        scheme, _ = build_scheme(scenario.coupling, participants, connections)
+        scheme, converged = build_scheme(scenario.coupling, participants, connections)
         build_master(scenario, participants, connections, scheme)
-        return describe(scenario, mesh, participants, connections)
+        return describe(scenario, mesh, participants, connections, converged)
 
 
 def called_directly(scenario: Scenario) -> Scenario:

@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 
-import networkx as nx
 import numpy as np
 
 from .coupling.build import idle
 from .coupling.connections import Connection
+from .coupling.loops import groups_in_order
 from .coupling.master import stepping_order
 from .participants.native import Mesh, element_quality
 from .participants.participant import Participant
@@ -26,8 +26,12 @@ def describe(
     mesh: Mesh | None,
     participants: Mapping[str, Participant],
     connections: Sequence[Connection],
+    converged: Mapping[str, str],
 ) -> str:
-    """The text for a person: mesh, units, connections, loops, order, exchange, what is not modelled, warnings."""
+    """The text for a person: mesh, units, connections, loops, order, exchange, what is not modelled, warnings.
+
+    `converged` says by what each field of an iterated loop is judged.
+    """
     order = stepping_order(participants, scenario.coupling.order)
     parts = {
         "mesh": [] if mesh is None else list(_mesh(mesh)),
@@ -35,7 +39,11 @@ def describe(
         "connections": [str(link) + _fixed(link, participants) for link in connections] or ["none"],
         "loops": _loops(order, connections) or ["none: one ordered sweep is exact, there is nothing to iterate"],
         "order": [" -> ".join(order)],
-        "exchange": list(_exchange(scenario, participants, connections, order)),
+        "convergence": [f"{name}: {criterion}" for name, criterion in converged.items()],
+        "exchange": [
+            *_exchange(scenario, participants, connections, order),
+            *_held(scenario, participants, connections, order),
+        ],
         "not modelled": list(_absent(participants, connections)) or ["nothing is left out"],
         "warnings": list(_warnings(scenario, mesh)) or ["none"],
     }
@@ -69,15 +77,26 @@ def _units(scenario: Scenario, participants: Mapping[str, Participant]) -> Itera
 
 
 def _loops(order: Sequence[str], connections: Sequence[Connection]) -> list[str]:
-    graph = nx.DiGraph()
-    graph.add_nodes_from(order)
-    graph.add_edges_from(
-        (link.source.unit, link.target.unit)
-        for link in connections
-        if link.source.unit in order and link.target.unit in order
-    )
-    found = [members for members in nx.strongly_connected_components(graph) if len(members) > 1]
-    return [" <-> ".join(sorted(members, key=order.index)) for members in found]
+    return [" <-> ".join(group.units) for group in groups_in_order(order, connections) if len(group.units) > 1]
+
+
+def _held(
+    scenario: Scenario,
+    participants: Mapping[str, Participant],
+    connections: Sequence[Connection],
+    order: Sequence[str],
+) -> Iterator[str]:
+    """The inputs that are held although the scenario asks for linear ones."""
+    if scenario.coupling.interpolation != "linear":
+        return
+    for link in connections:
+        abilities = participants[link.target.unit].abilities
+        moves = link.target.unit in order and not _fixed(link, participants)
+        if moves and not abilities.ramps and not abilities.memoryless:
+            yield (
+                f"{link.target}: held over every step, although `interpolation: linear` is asked for, because the unit "
+                "cannot follow an input inside a step; the coupling is of first order there"
+            )
 
 
 def _exchange(

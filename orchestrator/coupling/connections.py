@@ -1,10 +1,8 @@
 """Who feeds whom: the connections of a scenario, written out or found by name, and checked."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-
-import networkx as nx
 
 from ..errors import InputError, did_you_mean
 from ..participants.participant import Participant, Port, Ramp, Values
@@ -96,23 +94,6 @@ def connect(
             participants[connection.target.unit].inputs[connection.target.name],
         )
     return tuple(connections)
-
-
-def initial_order(units: Iterable[str], connections: Iterable[Connection]) -> list[str]:
-    """An order in which units can be initialised: each after those that feed it, as far as loops allow.
-
-    Inside a loop the given order of the units decides, and the inputs that close it start at their start values.
-    """
-    order = list(units)
-    graph = nx.DiGraph()
-    graph.add_nodes_from(order)
-    graph.add_edges_from((link.source.unit, link.target.unit) for link in connections)
-    loops = nx.condensation(graph)
-    position = {unit: number for number, unit in enumerate(order)}
-    sequence = nx.lexicographical_topological_sort(
-        loops, key=lambda loop: min(position[unit] for unit in loops.nodes[loop]["members"])
-    )
-    return [unit for loop in sequence for unit in sorted(loops.nodes[loop]["members"], key=position.__getitem__)]
 
 
 def _parse(text: str, participants: Mapping[str, Participant]) -> Connection:

@@ -19,6 +19,16 @@ from ..participants.participant import Participant, Ramp, Values
 from .connections import Connection, End
 from .history import History
 
+_MS_PER_S = 1000.0
+
+
+@dataclass(frozen=True)
+class Use:
+    """What an input was in the last step, in its source's terms: the value at the step's end, ramped to or held."""
+
+    end: Values
+    ramped: bool
+
 
 @dataclass(frozen=True)
 class Inputs:
@@ -47,12 +57,23 @@ class Exchange:
         self._begins: dict[str, dict[End, Values]] = {}
         self._known: set[End] = set()
         self._collected: set[End] = set()
+        self._uses: dict[Connection, Use] = {}
         self._end = 0.0
 
     @property
     def moving(self) -> list[End]:
         """The connected outputs that change with time."""
         return list(self._histories)
+
+    @property
+    def end_ms(self) -> float:
+        """Where the present step ends."""
+        return self._end * _MS_PER_S
+
+    @property
+    def extrapolation(self) -> int:
+        """Order by which inputs that are not known yet are extrapolated."""
+        return self._behaviour.extrapolation
 
     # --- a step -------------------------------------------------------------------------------------------------------
 
@@ -62,13 +83,22 @@ class Exchange:
         self._before = dict(self._values)
         self._known.clear()
         self._collected.clear()
+        self._uses.clear()
 
     def accept(self, units: Iterable[str]) -> None:
         """The step is over: the values are those at its end; `units` stepped."""
         for end in self._collected:
             self._remember(end)
         for unit in units:
-            self._mark(unit)
+            self.mark(unit)
+
+    def mark(self, unit: str) -> None:
+        """The inputs of `unit` are what they are now: where its next ramps begin."""
+        self._begins[unit] = {
+            link.source: self._values[link.source]
+            for link in self._connections
+            if link.target.unit == unit and link.source in self._values and not self._is_fixed(link.source)
+        }
 
     def undo(self) -> None:
         """The step is not taken: everything is as before `begin`."""
@@ -100,13 +130,15 @@ class Exchange:
             fixed = participant.inputs[link.target.name].fixed or self._is_fixed(link.source)
             if fixed and not initially:
                 continue
+            at_end = self._at_end(link.source)
+            self._uses[link] = Use(at_end, ramps)
             with blaming(unit):
                 if ramps:
                     participant.ramp(link.target.name, link.ramped(self._ramp(unit, link.source)))
                 else:
-                    participant.set(link.target.name, link.carried(self._at_end(link.source)))
+                    participant.set(link.target.name, link.carried(at_end))
         if initially:
-            self._mark(unit)
+            self.mark(unit)
 
     def latest(self, end: End) -> Values:
         """The value that connected inputs are fed with."""
@@ -120,6 +152,18 @@ class Exchange:
     def foretold(self, end: End, order: int | None = None) -> Values:
         """What the past values say of an output at the step's end, by the inputs' order if none is given."""
         return self._histories[end].extrapolated(self._end, self._behaviour.extrapolation if order is None else order)
+
+    def begun(self, link: Connection) -> Values:
+        """What the input of `link` is fed by as it was when its unit was stepped last, where a ramp begins."""
+        return self._begins[link.target.unit].get(link.source, self._values[link.source])
+
+    def used(self) -> Iterator[tuple[Connection, Use]]:
+        """How inputs were set in this step whose source and whose unit both took it."""
+        return ((link, use) for link, use in self._uses.items() if link.source in self._collected)
+
+    def stepped(self, end: End) -> bool:
+        """Whether the value of an output is new in this step; that of a unit which waits is older."""
+        return end in self._collected
 
     def depth(self, end: End) -> int:
         """How many past values of an output are known."""
@@ -174,13 +218,6 @@ class Exchange:
     def _remember(self, end: End) -> None:
         if end in self._histories:
             self._histories[end].add(self._end, self._values[end])
-
-    def _mark(self, unit: str) -> None:
-        self._begins[unit] = {
-            link.source: self._values[link.source]
-            for link in self._connections
-            if link.target.unit == unit and link.source in self._values and not self._is_fixed(link.source)
-        }
 
     def _is_fixed(self, end: End) -> bool:
         return self._participants[end.unit].outputs[end.name].fixed

@@ -22,8 +22,8 @@ class IterationLog:
         self._table = Table(folder / "iterations.csv", columns, None if resumed is None else int(resumed["rows"]))
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
-        """See Observer."""
-        for sweep in range(step.sweeps.iterations if step.sweeps.loops else 0):
+        """See Observer; the sweeps that made initial values agree are those of no step."""
+        for sweep in range(step.sweeps.iterations if step.number and step.sweeps.loops else 0):
             # A loop that converged earlier than another has no such sweep.
             norms: dict[str, float] = {}
             earlier: dict[str, float] = {}
