@@ -11,6 +11,7 @@ from rich.console import Console
 
 from .errors import InputError, Interrupted, RunError
 from .scenario import Scenario, load_scenario
+from .supervision import watch
 
 #: Exit codes; 1 is left for what should not happen, an exception nobody expected.
 INPUT_WRONG = 2
@@ -166,7 +167,10 @@ def _warn(text: str) -> None:
 
 
 def main() -> None:
-    """Entry point: exit code 0 done, 2 the input is wrong, 3 the run failed, 128 + signal when stopped; 1 is a bug."""
+    """The command, in this process.
+
+    Exit code 0: done; 2: the input is wrong; 3: the run failed; 128 + signal: stopped; 1: a bug.
+    """
     try:
         app()
     except InputError as error:
@@ -177,7 +181,10 @@ def main() -> None:
         sys.exit(RUN_FAILED)
 
 
-if __name__ == "__main__":
-    from .supervision import main as watched
+def supervised_main() -> None:
+    """The same, watched by a process that knows if foreign code ended it (`supervision`)."""
+    watch(main)
 
-    watched()
+
+if __name__ == "__main__":
+    supervised_main()

@@ -14,8 +14,8 @@ from mmap import mmap
 
 from . import activity
 
-#: Exit code of a run that failed, as in `cli`, which is not imported here: the parent is to stay small.
-_FAILED = 3
+#: Exit code of work that was cut off by one who called it done.
+_CUT_OFF = 3
 
 #: See prctl(2).
 _PR_SET_PDEATHSIG = 1
@@ -25,22 +25,18 @@ _PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, sign
 _STOPPING = (signal.SIGTSTP, signal.SIGCONT)
 
 
-def main() -> None:
-    """Entry point; see `cli.main` for the exit codes."""
+def watch(work: Callable[[], None]) -> None:
+    """Do `work` in a child process, and end this one with the exit code that fits what became of it.
+
+    Where the system cannot do that, the work is done here.
+    """
     if sys.platform != "linux":
-        _work()
+        work()
     else:
-        os._exit(watched(_work))
+        os._exit(_watched(work))
 
 
-def _work() -> None:
-    # Imported here: only the process that works needs it.
-    from .cli import main as command
-
-    command()
-
-
-def watched(work: Callable[[], None]) -> int:
+def _watched(work: Callable[[], None]) -> int:
     """Do `work` in a child process, and return the exit code that this one is to have."""
     board = activity.Board(mmap(-1, activity.SIZE))
     heard = [number for number in (*_PASSED_ON, *_STOPPING) if signal.getsignal(number) is not signal.SIG_IGN]
@@ -109,4 +105,4 @@ def _verdict(status: int, board: activity.Board) -> int:
         "run that unit in a process of its own with run.workers=processes\n"
     )
     sys.stderr.flush()
-    return 128 + number if killed else number or _FAILED
+    return 128 + number if killed else number or _CUT_OFF

@@ -12,12 +12,12 @@ import pytest
 _WATCHED = """
 import ctypes, os, signal, sys, time
 from cardiac_cosim.orchestrator.activity import doing
-from cardiac_cosim.orchestrator.supervision import watched
+from cardiac_cosim.orchestrator.supervision import watch
 
 def work():
     {work}
 
-os._exit(watched(work))
+watch(work)
 """
 
 
