@@ -136,7 +136,7 @@ class Fields:
         series = SubElement(SubElement(root, "Domain"), "Grid", GridType="Collection", CollectionType="Temporal")
         for frame, time in enumerate(self._parts.times):
             grid = SubElement(series, "Grid", Name="mesh")
-            SubElement(grid, "Time", Value=f"{time:.17g}")
+            SubElement(grid, "Time", Value=repr(time))
             elements = {"NumberOfElements": str(self._mesh.elements)}
             topology = SubElement(grid, "Topology", elements | _TOPOLOGIES[self._mesh.dimension])
             self._item(topology, "cells", self._mesh.cells.shape, "Int")
