@@ -62,6 +62,7 @@ class Recording:
         wall: Callable[[Mapping[str, Any] | None], WallClock],
     ) -> None:
         self.summary: dict[str, Any] = {}
+        self._refusal: RunError | None = None
         self._folder, self._origin, self._assembly = folder, origin, assembly
         kept = before or {}
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
@@ -111,7 +112,8 @@ class Recording:
             if self._keeps and step.number and step.number % self._every == 0:
                 self._checkpoint.write()
         except OSError as error:
-            raise self._refused(error) from error
+            self._refusal = self._refused(error)
+            raise self._refusal from error
 
     def keep(self) -> None:
         """Write a checkpoint of this moment, between two steps, where the units can be kept."""
@@ -119,7 +121,8 @@ class Recording:
             if self._keeps:
                 self._checkpoint.write()
         except OSError as error:
-            raise self._refused(error) from error
+            self._refusal = self._refused(error)
+            raise self._refusal from error
 
     def __enter__(self) -> "Recording":
         return self
@@ -167,9 +170,10 @@ class Recording:
 
     def _ending(self, error: BaseException | None, problems: list[Exception]) -> BaseException | None:
         """What a run ends with that ended with `error` and whose files then had these problems."""
-        if not problems:
-            return error
         bugs = [problem for problem in problems if not isinstance(problem, OSError)]
+        # Where the operating system has refused once, nobody need be told of every file again.
+        if not problems or (error is self._refusal is not None and not bugs):
+            return error
         if isinstance(error, RunError):
             return RunError(f"{error}; besides, {'; '.join(_told(problem) for problem in problems)}")
         if error is None or isinstance(error, Interrupted):
@@ -180,10 +184,10 @@ class Recording:
 
     def _refused(self, error: Exception) -> RunError:
         rows = self._series.rows
-        reached = f" The results up to {rows[-1][0]:g} ms are complete;" if rows else ""
+        reached = f". The results up to {rows[-1][0]:g} ms are complete" if rows else ""
         return RunError(
-            f"the results cannot be written: {_told(error)}.{reached} make room, or give back what was taken away, and "
-            "go on with --resume"
+            f"the results cannot be written ({_told(error)}){reached}; make room, or give back what was taken away, "
+            "and go on with --resume"
         )
 
 

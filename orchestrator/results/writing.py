@@ -40,5 +40,5 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(
-            f"{path} cannot be written ({error.strerror}); remove what is there or choose another --output"
+            f"{path} cannot be written ({error.strerror}); remove what is there, make room, or choose another --output"
         ) from None
