@@ -2,7 +2,10 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .coupling.schemes import Sweeps
 
 
 class InputError(Exception):
@@ -10,13 +13,14 @@ class InputError(Exception):
 
 
 class RunError(Exception):
-    """The physics or the coupling failed (exit code 3). The message says which unit, when, why and what to try.
+    """The physics, the coupling or the operating system failed (exit code 3).
 
-    `sweeps` is the history of the loops of a step that was not accepted, if it was iterated, and `time_ms` its end.
+    The message says which unit, when, why and what to try. Where an iteration failed, `sweeps` are those of the step
+    to `time_ms` that was not accepted.
     """
 
-    sweeps: Any = None
     time_ms: float | None = None
+    sweeps: "Sweeps | None" = None
 
 
 class Terminated(RunError):
@@ -54,7 +58,7 @@ class NotConverged(Exception):
     `sweeps` is the history of the step's loops, this one included.
     """
 
-    def __init__(self, message: str, sweeps: Any) -> None:
+    def __init__(self, message: str, sweeps: "Sweeps") -> None:
         super().__init__(message)
         self.sweeps = sweeps
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..coupling.exchange import Exchange
 from ..coupling.master import MASTER, Accepted
+from .names import COUPLING
 from .table import Table
 
 
@@ -17,8 +18,7 @@ class CouplingLog:
     `converged` names the fields that iterated loops exchange ("unit.field"); each has a column with its last residual.
     `contraction_rate` is empty where one sweep measures no rate. Where steps are `adaptive`, `error` is the estimated
     error over the tolerance, empty where there is none, and `tolerance_missed` is 1 where it is above and the step
-    could not be any shorter. `unconverged` keeps the times in ms of the steps that were accepted although their
-    iteration had not converged. `resumed` is the `memory` of an earlier run.
+    could not be any shorter. `resumed` is the `memory` of an earlier run.
     """
 
     def __init__(
@@ -29,7 +29,6 @@ class CouplingLog:
         adaptive: bool = False,
         resumed: Mapping[str, Any] | None = None,
     ) -> None:
-        self.unconverged: list[float] = [] if resumed is None else resumed["unconverged"].tolist()
         self._units = units
         self._converged = converged
         self._adaptive = adaptive
@@ -37,13 +36,25 @@ class CouplingLog:
         seconds = [f"seconds_{unit}" for unit in (*units, MASTER)]
         judged = ["error", "tolerance_missed"] if adaptive else []
         columns = ["time_ms", "step_ms", "iterations", *residuals, "contraction_rate", "rejected", *judged, *seconds]
-        self._table = Table(folder / "coupling.csv", columns, None if resumed is None else int(resumed["rows"]))
+        self._table = Table(folder / COUPLING, columns, resumed and resumed["table"])
+        times = [float(row[0]) for row in self._table.rows()]
+        self._rows = len(times)
+        # First and last row of each stretch of steps that had not converged: what is kept does not grow with it.
+        self._stretches: list[tuple[int, int]] = []
+        if resumed is not None:
+            self._stretches = [(int(first), int(last)) for first, last in resumed["unconverged"].reshape(-1, 2)]
+        self._unconverged = [time for first, last in self._stretches for time in times[first : last + 1]]
+        # The time of the initial values, if they do not agree: they have no row.
+        self._unsettled_ms: list[float] = [] if resumed is None else resumed["unsettled_ms"].tolist()
+
+    @property
+    def unconverged(self) -> list[float]:
+        """The times in ms of what was accepted although it had not converged, the initial values included."""
+        return self._unsettled_ms + self._unconverged
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
         """See Observer; the initial state is no step."""
         sweeps = step.sweeps
-        if not sweeps.converged:
-            self.unconverged.append(step.time_ms)
         if step.number:
             seconds = [step.seconds[unit] for unit in (*self._units, MASTER)]
             # A loop one of whose units did not step in this exchange was none.
@@ -51,14 +62,29 @@ class CouplingLog:
             first = [step.time_ms, step.size_ms, sweeps.iterations, *residuals, sweeps.contraction_rate, step.rejected]
             judged = [step.error, int(step.missed)] if self._adaptive else []
             self._table.add([*first, *judged, *seconds])
+            if not sweeps.converged:
+                self._note(step.time_ms)
+            self._rows += 1
+        elif not sweeps.converged:
+            self._unsettled_ms = [step.time_ms]
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
         return {
-            "rows": self._table.rows,
-            "unconverged": np.array(self.unconverged),
+            "table": self._table.memory(),
+            "unconverged": np.array(self._stretches, np.int64),
+            "unsettled_ms": np.array(self._unsettled_ms),
         }
 
     def close(self) -> None:
         """Close the file."""
         self._table.close()
+
+    def _note(self, time_ms: float) -> None:
+        """The step of the next row, to `time_ms`, was accepted without having converged."""
+        self._unconverged.append(time_ms)
+        before = self._stretches[-1] if self._stretches else None
+        if before is not None and before[1] == self._rows - 1:
+            self._stretches[-1] = (before[0], self._rows)
+        else:
+            self._stretches.append((self._rows, self._rows))
