@@ -52,14 +52,10 @@ def _tiny() -> Mesh:
     numbers[inverted] = numbers[inverted][:, [0, 2, 1, 3]]
     surface = Mesh(points, numbers).surface
     inside, outside = (surface < 5).all(axis=1), (surface >= 5).all(axis=1)
-    left = points[surface].mean(axis=1)[:, 0] < 0.0
     boundaries = {
         "base": surface[~inside & ~outside],
         "lv_endocardium": surface[inside],
         "epicardium": surface[outside],
-        # No second chamber; but its boundaries have to be there, open at the base only.
-        "rv_endocardium": surface[outside & left],
-        "rv_septum": surface[outside & ~left],
     }
     return Mesh(points, numbers, boundaries)
 

@@ -18,11 +18,11 @@ import numpy as np
 from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
+from ..mesh.cavity import Cavity
 from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Location, Record, Variable
-from .cavity import Cavity
 from .equilibrium import Convergence, Equilibrium, Factored
 from .holzapfel_fiber import HolzapfelFiber
 from .neo_hooke import NeoHooke
