@@ -15,7 +15,7 @@ from .coupling.build import build_master, build_scheme
 from .coupling.connections import connect
 from .coupling.master import Observer
 from .errors import InputError, Interrupted, RunError
-from .participants.native import Mesh, check_unit, fmu_of_unit, scene_mesh
+from .participants.native import Mesh, check_mesh, check_unit, fmu_of_unit, scene_mesh
 from .participants.participant import Participant
 from .participants.recipe import Recipe
 from .probes import Probes
@@ -29,6 +29,7 @@ from .results.summary import write_summary
 from .results.time_series import TimeSeries
 from .results.writing import remove_stale
 from .scenario import Scenario, UnitEntry
+from .scene_warnings import scene_warnings
 from .show import describe
 from .stopping import StopRequest
 from .wall_clock import WallClock
@@ -69,6 +70,11 @@ def run_scenario(
         return Outcome(output, complete)
     mesh = checked_mesh(scenario, base)
     probes = None if mesh is None else Probes(mesh, scenario.output.probes_mm)
+    warnings = scene_warnings(scenario, mesh)
+    if console is not None:
+        console.print(
+            *(f"warning: {text}" for text in warnings), sep="\n", end="\n" if warnings else "", soft_wrap=True
+        )
     make_folder(output, "--output")
     resumed = read_checkpoint(output, scenario) if resume else None
     with ExitStack() as stack:
@@ -132,7 +138,7 @@ def run_scenario(
             for recorder in recorders.values():
                 recorder.close()
             resumable = keeps and outcome["status"] != "done"
-            outcome |= {"unconverged_ms": log.unconverged, "resumable": resumable}
+            outcome |= {"unconverged_ms": log.unconverged, "resumable": resumable, "warnings": warnings}
             summary = write_summary(output / "summary.json", scenario, series, wall.seconds(), outcome)
             if not resumable:
                 _forget(checkpoint, fields)
@@ -183,7 +189,10 @@ def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
     if scenario.scene is None:
         return None
     with _naming("scene"):
-        return scene_mesh(scenario.scene, base)
+        mesh = scene_mesh(scenario.scene, base)
+        units = [entry.unit for entry in scenario.units.values() if entry.unit is not None]
+        check_mesh(mesh, scenario.scene, base, units)
+    return mesh
 
 
 def make_participants(

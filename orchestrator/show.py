@@ -12,6 +12,7 @@ from .coupling.master import stepping_order
 from .participants.native import Mesh, element_quality
 from .participants.participant import Participant
 from .scenario import Scenario
+from .scene_warnings import scene_warnings
 
 #: 10–90 % width of a depolarising front in mm (model.md, Numbers); an element longer than half of it is too coarse.
 _FRONT_MM = 7.9
@@ -37,7 +38,7 @@ def describe(
         "order": [" -> ".join(order)],
         "exchange": list(_exchange(scenario, participants, connections, order)),
         "not modelled": list(_absent(participants, connections)) or ["nothing is left out"],
-        "warnings": list(_warnings(scenario, mesh)) or ["none"],
+        "warnings": [*scene_warnings(scenario, mesh), *_warnings(scenario, mesh)] or ["none"],
     }
     lines = [scenario.name]
     for title, content in parts.items():
