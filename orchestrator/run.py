@@ -72,9 +72,8 @@ def run_scenario(
     probes = None if mesh is None else Probes(mesh, scenario.output.probes_mm)
     warnings = scene_warnings(scenario, mesh)
     if console is not None:
-        console.print(
-            *(f"warning: {text}" for text in warnings), sep="\n", end="\n" if warnings else "", soft_wrap=True
-        )
+        for text in warnings:
+            console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
     make_folder(output, "--output")
     resumed = read_checkpoint(output, scenario) if resume else None
     with ExitStack() as stack:
