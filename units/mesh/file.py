@@ -110,10 +110,8 @@ def _cleaned(stored: StoredMesh, naming: Naming, scale: float) -> Mesh:
         boundaries[name] = faces
     dropped = _strangers_inside(boundaries, cells, len(used))
     for name in dropped:
-        notes.append(
-            f"the group '{name}' has {dropped[name]} faces that are not on the surface; no unit knows it, and it was "
-            "left out"
-        )
+        what = f"{dropped[name]} faces that are not on the surface" if dropped[name] else "no triangles"
+        notes.append(f"the group '{name}' has {what}; no unit knows it, and it was left out")
         del boundaries[name]
     return Mesh(points, cells, boundaries, tuple(notes))
 
@@ -126,7 +124,7 @@ def _once(faces: IntArray, nodes: int) -> tuple[IntArray, int]:
 
 
 def _strangers_inside(boundaries: dict[str, IntArray], cells: IntArray, nodes: int) -> dict[str, int]:
-    """How many faces are not on the surface, of each group that no unit knows and that has such."""
+    """How many faces are not on the surface, of each group that no unit knows and that has such, or no faces at all."""
     strangers = [name for name in boundaries if name not in BOUNDARIES]
     if not strangers:
         return {}

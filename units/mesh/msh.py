@@ -48,7 +48,7 @@ _KINDS = {
 #: Numbers above this are no longer exact as floats, and no mesh has as many of anything.
 _LARGEST = 2**53
 
-_PHYSICAL_NAME = re.compile(r'^\s*(\d+)\s+(-?\d+)\s+"(.*)"\s*$')
+_PHYSICAL_NAME = re.compile(r'^\s*(\d{1,9})\s+(-?\d{1,12})\s+"(.*)"\s*$')
 _SECTION = re.compile(rb"\$([A-Za-z]\w*)[ \t]*\r?\n")
 
 

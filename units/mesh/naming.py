@@ -28,8 +28,8 @@ def named_faces(stored: StoredMesh, naming: Naming) -> dict[str, IntArray]:
     Raises
     ------
     InvalidInput
-        For names and numbers that the file does not have, numbers that several arrays have and mean different faces
-        by, and a file without names and `naming`.
+        For groups without triangles, names and numbers that the file does not have, numbers that several arrays have
+        and mean different faces by, and a file without names and `naming`.
     """
     for name in naming:
         if name not in BOUNDARIES:
@@ -39,6 +39,12 @@ def named_faces(stored: StoredMesh, naming: Naming) -> dict[str, IntArray]:
     used = {group for groups in naming.values() for group in groups}
     told = {name: _gathered(stored, name, groups) for name, groups in naming.items()}
     kept = {name: members for name, members in stored.named.items() if name not in used and name not in told}
+    empty = [name for name, members in (kept | told).items() if name in BOUNDARIES and not len(members)]
+    if empty:
+        raise InvalidInput(
+            f"there are no triangles in {', '.join(map(repr, empty))}; save the surface's triangles with their "
+            "physical groups (in gmsh: Mesh.SaveAll=0)"
+        )
     if not told and not kept:
         raise InvalidInput(f"has no named boundaries; {_remedy(stored)}")
     return kept | told
