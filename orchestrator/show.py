@@ -5,6 +5,7 @@ from math import ceil
 
 import numpy as np
 
+from .assembly import Assembly
 from .coupling.build import idle
 from .coupling.connections import Connection
 from .coupling.loops import groups_in_order
@@ -21,17 +22,10 @@ _UPSTROKE_MS = 15.0
 _ELEMENTS = {0: "points", 1: "lines", 2: "triangles", 3: "tetrahedra"}
 
 
-def describe(
-    scenario: Scenario,
-    mesh: Mesh | None,
-    participants: Mapping[str, Participant],
-    connections: Sequence[Connection],
-    converged: Mapping[str, str],
-) -> str:
-    """The text for a person: mesh, units, connections, loops, order, exchange, what is not modelled, warnings.
-
-    `converged` says by what each field of an iterated loop is judged.
-    """
+def describe(assembly: Assembly) -> str:
+    """The text for a person: mesh, units, connections, loops, order, exchange, what is not modelled, warnings."""
+    scenario, mesh, participants = assembly.scenario, assembly.mesh, assembly.participants
+    connections = assembly.connections
     order = stepping_order(participants, scenario.coupling.order)
     parts = {
         "mesh": [] if mesh is None else list(_mesh(mesh)),
@@ -39,13 +33,13 @@ def describe(
         "connections": [str(link) + _fixed(link, participants) for link in connections] or ["none"],
         "loops": _loops(order, connections) or ["none: one ordered sweep is exact, there is nothing to iterate"],
         "order": [" -> ".join(order)],
-        "convergence": [f"{name}: {criterion}" for name, criterion in converged.items()],
+        "convergence": [f"{name}: {criterion}" for name, criterion in assembly.converged.items()],
         "exchange": [
             *_exchange(scenario, participants, connections, order),
             *_held(scenario, participants, connections, order),
         ],
         "not modelled": list(_absent(participants, connections)) or ["nothing is left out"],
-        "warnings": list(_warnings(scenario, mesh)) or ["none"],
+        "warnings": [*assembly.warnings, *_warnings(scenario, mesh)] or ["none"],
     }
     lines = [scenario.name]
     for title, content in parts.items():

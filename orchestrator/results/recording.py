@@ -143,6 +143,7 @@ class Recording:
             "unconverged_ms": self._log.unconverged,
             "tolerance_missed": asdict(self._assembly.master.missed),
             "resumable": resumable,
+            "warnings": list(self._assembly.warnings),
         }
         scenario, seconds = self._assembly.scenario, self._wall.seconds()
         path = self._folder / SUMMARY
