@@ -156,7 +156,10 @@ class NativeParticipant:
 
     def get(self, name: str) -> Values:
         """See Participant."""
-        return self._unit.get(name)  # type: ignore[no-any-return]
+        try:
+            return self._unit.get(name)  # type: ignore[no-any-return]
+        except (InvalidInput, StepFailure) as error:
+            raise ParticipantError(str(error)) from error
 
     def start(self, time: float, size: float) -> Wait:
         """See Participant; the step is done when this returns."""
