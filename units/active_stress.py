@@ -32,8 +32,8 @@ from .variable import VOLTAGE, Causality, Location, Record, Variable, parameter
 
 _KPA_PER_MPA = 1000.0
 
-#: A thousand times what muscle builds up; steel breaks below it.
-_LARGEST_KPA = 1e6
+#: Two hundred times what muscle builds up.
+_LARGEST_KPA = 1e5
 
 
 @dataclass(frozen=True)

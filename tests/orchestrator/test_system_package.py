@@ -501,9 +501,9 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
     ("changes", "files", "words"),
     [
         (
-            [("</ssd:Elements>", f"{_NESTED}</ssd:Elements>")],
+            [("</ssd:Elements>", f"{_NESTED * 2}</ssd:Elements>")],
             {},
-            ["'inner' is a system inside the system", "not supported"],
+            ["the system has two elements 'inner'", "rename one"],
         ),
         (
             [("</ssd:Elements>", '<ssd:SignalDictionaryReference name="bus" dictionary="d"/></ssd:Elements>')],
@@ -513,13 +513,13 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('source="resources/mass.fmu" impl', 'type="application/x-ssp-package" source="resources/mass.fmu" impl')],
             {},
-            ["component 'second' is a package of its own", "only FMUs"],
+            ["the system of component 'second'", "there is no SystemStructure.ssd in it"],
         ),
         ([('implementation="CoSimulation"', 'implementation="ModelExchange"')], {}, ["'second'", "model exchange"]),
         (
             [("</ssd:Connections>", f"{_OUTSIDE}</ssd:Connections>")],
             {},
-            ["connector 'u' is one of the system itself", "connect the components directly"],
+            ["the system has no connector 'u'"],
         ),
         (
             [('endElement="second"', 'endElement="secnd"')],
@@ -539,7 +539,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('name="x_in" kind="input"', 'name="x_in" kind="output"')],
             {},
-            ["the FMU resources/mass.fmu has no output of that name"],
+            ["'second.x_in' is of the kind output", "the FMU resources/mass.fmu has no output of that name"],
         ),
         (
             [('startConnector="v_in"', 'startConnector="F"')],
@@ -564,10 +564,14 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('prefix="second."/>', 'prefix="second."><ssd:ParameterMapping source="x.ssm"/></ssd:ParameterBinding>')],
             {},
-            ["the system has a ParameterMapping", "not supported"],
+            ["parameter mapping of the system, x.ssm", "not in the package"],
         ),
         ([('prefix="second."', 'prefix="second." type="text/csv"')], {}, ["of the type text/csv"]),
-        ([('prefix="second."', 'prefix="second." sourceBase="component"')], {}, ["source inside an FMU"]),
+        (
+            [('prefix="second."', 'prefix="second." sourceBase="component"')],
+            {},
+            ["the parameter set of the system is to be in an FMU"],
+        ),
         ([(' source="resources/damping.ssv"', "")], {}, ["needs either a source or a ParameterSet"]),
         ([("resources/damping.ssv", "resources/dampng.ssv")], {}, ["resources/dampng.ssv", "not in the package"]),
         ([("resources/damping.ssv", "../damping.ssv")], {}, ["../damping.ssv, outside of the package"]),
@@ -577,7 +581,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
             {},
             ["the FMU of component 'first', resources/muss.fmu", "not in the package"],
         ),
-        ([], {"resources__damping_dot_ssv": "<ssv"}, ["resources/damping.ssv: no well-formed XML"]),
+        ([], {"resources__damping_dot_ssv": "<ssv"}, ["resources/damping.ssv: it is no well-formed XML"]),
         (
             [],
             {"resources__damping_dot_ssv": _ssv(c=1).replace("ssv:Real value", "ssv:Reel value")},
@@ -599,7 +603,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
             ["'c' of type Real cannot be 'thick'"],
         ),
         ([], {"resources__damping_dot_ssv": _ssv(F=1)}, ["'F'", "takes a start value"]),
-        ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: no well-formed XML"]),
+        ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: it is no well-formed XML"]),
         (
             [('version="1.0" name="two masses"', 'version="2.0" name="two masses"')],
             {},
