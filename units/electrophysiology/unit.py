@@ -38,7 +38,10 @@ from .time_scale import TimeScale
 NOT_ACTIVATED = -1.0
 
 #: Substeps of a communication step, and elements and levels of a refinement, that nobody would wait for.
-_MOST_SUBSTEPS, _MOST_ELEMENTS, _MOST_LEVELS = 100_000, 2_000_000, 25
+_MOST_SUBSTEPS, _MOST_ELEMENTS, _MOST_LEVELS = 100_000, 1_000_000, 25
+
+#: Dimensionless potential of which nothing is left but numbers; that of cells lies between 0 and 1.
+_LARGEST_PHI = 100.0
 
 
 @dataclass(frozen=True)
@@ -163,6 +166,12 @@ class Electrophysiology(Unit):
                 raise StepFailure(
                     f"the potential at node {phi.argmin()} fell below {self._lowest_potential:g} mV, the pole of the "
                     "ionic model's recovery rate; look for degenerate elements there or lower longest_substep_ms"
+                )
+            if not np.abs(phi).max() <= _LARGEST_PHI:
+                node = int(np.abs(phi).argmax())
+                raise StepFailure(
+                    f"the dimensionless potential at node {node} is {phi[node]:.3g}, which no cell reaches; lower "
+                    "longest_substep_ms, or check the parameters of the ionic model"
                 )
             activation_time = self._activated(activation_time, before, phi, time + number * substep, substep)
         return {"phi": phi, "recovery": recovery, "activation_time": activation_time}
