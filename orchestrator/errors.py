@@ -33,6 +33,12 @@ class ParticipantLost(ParticipantError):
     """A participant is gone for good: its process died, or it did not come back in time."""
 
 
+class ParticipantTerminated(ParticipantError):
+    """A participant asks for the end of the simulation; `time_s` is the last time it reached, where it says so."""
+
+    time_s: float | None = None
+
+
 class NotConverged(Exception):
     """The iteration of a loop found no solution of the step; the master adds when it was."""
 

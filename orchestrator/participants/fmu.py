@@ -18,7 +18,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ...fmus.model_description import INPUT_INTERPOLATION
-from ..errors import InputError, ParticipantError
+from ..errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
 from .fmi2_calls import Fmi2Calls
 from .fmi3_calls import Fmi3Calls
 from .fmu_description import read_description
@@ -59,8 +59,11 @@ class Calls(Protocol):
     def free_instance(self) -> None:
         """Free the instance and unload the FMU."""
 
+    def setup_experiment(self) -> None:
+        """Set up an experiment from time 0 on: before any value is set, for some FMUs reset their parameters then."""
+
     def enter_initialization_mode(self) -> None:
-        """Begin the initialization, of an experiment from time 0 on."""
+        """Begin the initialization."""
 
     def exit_initialization_mode(self) -> None:
         """End it."""
@@ -81,7 +84,7 @@ class Calls(Protocol):
         """Set a variable of any type, an array to one value everywhere; `variable` is FMPy's."""
 
     def step(self, time: float, size: float) -> None:
-        """Advance from `time` by `size`."""
+        """Advance from `time` by `size`; ParticipantTerminated if the FMU asks for the end of the simulation."""
 
     def save(self) -> Any:
         """The state."""
@@ -136,6 +139,7 @@ class FmuParticipant:
                 self._folder = Path(tempfile.mkdtemp(prefix="cosim-fmu-"))
                 _extract(path, self._folder)
                 self._instantiate(calls)
+                self._set_up()
                 self._set_values(description.modelVariables, parameters, "parameter")
                 self._set_values(description.modelVariables, start or {}, "start value")
             except BaseException:
@@ -260,7 +264,11 @@ class FmuParticipant:
             if error.status == _FATAL:
                 # FMI allows no further call, not even to free it; those written in Python would crash the process.
                 self._calls = None
-            raise ParticipantError(str(self._log) or f"{error} The FMU logged no reason") from None
+            kind = ParticipantLost if error.status == _FATAL else ParticipantError
+            raise kind(str(self._log) or f"{error} The FMU logged no reason") from None
+        except ParticipantTerminated as error:
+            error.args = ("; ".join((*error.args, *self._log.errors)),)
+            raise
         if self._log.errors:
             raise ParticipantError(str(self._log))
         return result
@@ -292,6 +300,12 @@ class FmuParticipant:
         except Exception as error:
             raise InputError(f"the FMU cannot be instantiated: {error} {calls.log}".rstrip()) from None
         self._calls = calls
+
+    def _set_up(self) -> None:
+        try:
+            self._call(lambda calls: calls.setup_experiment())
+        except ParticipantError as error:
+            raise InputError(f"the FMU takes no experiment that begins at 0 s: {error}") from None
 
     def _set_values(self, variables: Any, values: Parameters, what: str) -> None:
         declared = {variable.name: variable for variable in variables}

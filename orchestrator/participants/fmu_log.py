@@ -1,5 +1,7 @@
 """The log messages of FMUs, each brought to the participant it belongs to."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from ctypes import byref
 from typing import Any
 from weakref import WeakValueDictionary
@@ -16,30 +18,43 @@ from fmpy.logging import addLoggerProxy
 
 from ...fmus.messages import INVALID_INPUT
 
-#: fmi2Status from which a message tells of a failure.
-_ERROR = 3
+#: fmi2Status from which a message tells of a failure, and from which it may tell why one came about.
+_ERROR, _WARNING = 3, 1
 
 
 class FmuLog:
-    """The errors that one FMU has logged since the last `clear`."""
+    """The errors that one FMU has logged since the last `clear`; `reasons` are what it warned of, or discards by."""
 
     def __init__(self) -> None:
         self.errors: list[str] = []
+        self.reasons: list[str] = []
         self.blames_input = False
 
     def clear(self) -> None:
         """Forget what was logged."""
         self.errors.clear()
+        self.reasons.clear()
         self.blames_input = False
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """What is logged in here is not what the call failed by: a question that an FMU need not answer."""
+        before = list(self.errors), list(self.reasons), self.blames_input
+        try:
+            yield
+        finally:
+            self.errors, self.reasons, self.blames_input = before
 
     def hear(self, status: int, category: bytes, message: bytes) -> None:
         """Take a message; errors are kept until the call that caused them returns."""
         if status >= _ERROR:
             self.errors.append(message.decode("utf-8", errors="replace"))
             self.blames_input = category == INVALID_INPUT.encode()
+        elif status >= _WARNING:
+            self.reasons.append(message.decode("utf-8", errors="replace"))
 
     def __str__(self) -> str:
-        return "; ".join(self.errors)
+        return "; ".join(self.errors or self.reasons)
 
 
 class Fmi2Log(FmuLog):
