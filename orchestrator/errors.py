@@ -2,6 +2,10 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .coupling.schemes import Sweeps
 
 
 class InputError(Exception):
@@ -9,7 +13,14 @@ class InputError(Exception):
 
 
 class RunError(Exception):
-    """The physics or the coupling failed (exit code 3). The message says which unit, when, why and what to try."""
+    """The physics, the coupling or the operating system failed (exit code 3).
+
+    The message says which unit, when, why and what to try. Where an iteration failed, `sweeps` are those of the step
+    to `time_ms` that was not accepted.
+    """
+
+    time_ms: float | None = None
+    sweeps: "Sweeps | None" = None
 
 
 class Interrupted(Exception):

@@ -249,6 +249,11 @@ class Scenario(_Section):
                 f"more than {_MOST_STEPS:.0e} are refused; change one of them"
             )
 
+    def files(self) -> list[str]:
+        """The files that the scenario names, beside its own, as it names them."""
+        named = [None if self.scene is None else self.scene.mesh, *(entry.fmu for entry in self.units.values())]
+        return list(dict.fromkeys(name for name in named if name is not None))
+
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out; it can be loaded again."""
         without: dict[str, set[str]] = {}

@@ -8,10 +8,10 @@ from typing import Any
 
 from ..fmus.model_description import INPUT_INTERPOLATION
 from ..fmus.system import Component, Link, System
+from .assembly import called_directly, make_participants
 from .coupling.connections import connect
 from .participants.fmu_variables import declares_ramps
 from .participants.native import Mesh
-from .run import called_directly, make_participants
 from .scenario import Scenario
 
 _MS_PER_S = 1000.0

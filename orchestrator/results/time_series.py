@@ -5,12 +5,11 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..participants.participant import Participant
 from ..probes import Probes
+from .names import TIME_SERIES
 from .table import Table
 
 
@@ -48,8 +47,9 @@ class TimeSeries:
                 self.columns += [f"{stem}_{probe}{suffix}" for probe in (probes.names if probes else ())]
             else:
                 self.columns.append(f"{stem}{suffix}")
-        self.rows: list[list[float]] = [] if resumed is None else np.atleast_2d(resumed["rows"]).tolist()
-        self._table = Table(folder / "timeseries.csv", self.columns, None if resumed is None else len(self.rows))
+        self._table = Table(folder / TIME_SERIES, self.columns, resumed)
+        # Numbers come back from their shortest decimals to the last bit.
+        self.rows = [[float(cell) if cell else nan for cell in row] for row in self._table.rows()]
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
         """See Observer."""
@@ -70,7 +70,7 @@ class TimeSeries:
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
-        return {"rows": np.array(self.rows)}
+        return self._table.memory()
 
     def column(self, name: str) -> list[float]:
         """All values of a column so far."""
