@@ -113,9 +113,9 @@ def open_archive(path: Path) -> Iterator[Archive]:
         If it is none, is damaged or encrypted, has members outside of its folder, links, two members of one name, or
         unpacks to more than is sensible. The message names the member and the remedy, not the archive.
     """
-    if not path.is_file():
-        raise InputError("no such file")
     try:
+        if not path.is_file():
+            raise InputError("no such file")
         archive = _looked_through(path)
     except _DAMAGE as error:
         raise InputError(f"it is no zip archive, or a damaged one ({shortened(str(error))}); write it anew") from None
