@@ -26,7 +26,7 @@ def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[
     Its connections are all that the scenario resolves to, those found by name included. InputError as for a run.
     """
     with ExitStack() as stack:
-        participants = make_participants(stack, called_directly(scenario), base, mesh)
+        participants = make_participants(stack, called_directly(scenario), base, mesh, described=True)
         connections = connect(participants, scenario.connections, scenario.connect_by_name)
     components = []
     for name, entry in scenario.units.items():

@@ -74,11 +74,13 @@ class Fmi2Calls:
 
     def set(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi2SetReal(self._slave.component, field.references, field.size, field.buffer)
+        call = getattr(self._slave, f"fmi2Set{field.kind}")
+        call(self._slave.component, field.references, field.size, field.buffer)
 
     def get(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi2GetReal(self._slave.component, field.references, field.size, field.buffer)
+        call = getattr(self._slave, f"fmi2Get{field.kind}")
+        call(self._slave.component, field.references, field.size, field.buffer)
 
     def set_derivative(self, field: Field, order: int) -> None:
         """See Calls (FMI 2.0.4, section 4.2.1)."""

@@ -58,15 +58,13 @@ class Fmi3Calls:
 
     def set(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi3SetFloat64(
-            self._slave.component, field.references, len(field.references), field.buffer, field.size
-        )
+        call = getattr(self._slave, f"fmi3Set{field.kind}")
+        call(self._slave.component, field.references, len(field.references), field.buffer, field.size)
 
     def get(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi3GetFloat64(
-            self._slave.component, field.references, len(field.references), field.buffer, field.size
-        )
+        call = getattr(self._slave, f"fmi3Get{field.kind}")
+        call(self._slave.component, field.references, len(field.references), field.buffer, field.size)
 
     def set_derivative(self, field: Field, order: int) -> None:
         """See Calls."""

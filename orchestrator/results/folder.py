@@ -15,7 +15,7 @@ from ..wall_clock import WallClock
 from .checkpoint import Memories, read_checkpoint
 from .hdf5 import DamagedFile
 from .lock import FolderLock
-from .names import CHECKPOINT, COUPLING, FIELDS, GROWING, ITERATIONS, PARTS, SUMMARY, TIME_SERIES, WHOLE, XDMF
+from .names import CHECKPOINT, COUPLING, FIELDS, FMU_LOG, GROWING, ITERATIONS, PARTS, SUMMARY, TIME_SERIES, WHOLE, XDMF
 from .origin import Origin
 from .recording import Recording
 from .summary import is_summary
@@ -100,6 +100,7 @@ class ResultsFolder:
         remove_stale(self.path / SUMMARY)
         if before is None:
             remove_stale(self.path / CHECKPOINT)
+            remove_stale(self.path / FMU_LOG)
         with allowed(self.path, "--output"):
             self._remove_leftovers()
         if not assembly.converged:
