@@ -10,10 +10,12 @@ from .coupling.connections import Connection, connect
 from .coupling.master import Master
 from .errors import InputError, ParticipantError, RunError
 from .fmu_folder import FmuFolder
+from .participants.driven import drive
 from .participants.native import Mesh, check_unit, scene_mesh
 from .participants.participant import Participant
 from .participants.recipe import Recipe
 from .probes import Probes
+from .results.time_series import recorded
 from .scenario import Scenario, UnitEntry
 
 
@@ -46,6 +48,11 @@ def assemble(
     probes = None if mesh is None else Probes(mesh, scenario.output.probes_mm)
     participants = make_participants(stack, scenario, base, mesh, fmu_dir, described)
     connections = connect(participants, scenario.connections, scenario.connect_by_name)
+    if scenario.inputs is not None:
+        connected = [(link.target.unit, link.target.name) for link in connections]
+        ramps = scenario.coupling.interpolation == "linear"
+        participants = drive(participants, connected, base / scenario.inputs.file, ramps)
+    recorded(participants)
     scheme, converged = build_scheme(scenario.coupling, participants, connections)
     master = build_master(scenario, participants, connections, scheme)
     return Assembly(scenario, mesh, probes, participants, connections, converged, master)

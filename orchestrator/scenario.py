@@ -150,10 +150,19 @@ class ConnectionEntry(_Section):
 #: How pydantic marks in which of its two forms a connection was read; no person has to see that.
 _AS_TEXT, _AS_ENTRY = "[text]", "[entry]"
 
+
+def _form(given: Any) -> str:
+    """A mapping with none of the keys is a text that was broken at its colon."""
+    is_entry = isinstance(given, ConnectionEntry) or (
+        isinstance(given, Mapping) and not {"from", "output", "to", "input"}.isdisjoint(given)
+    )
+    return _AS_ENTRY if is_entry else _AS_TEXT
+
+
 #: A connection as 'unit.output -> unit.input', or in its parts.
 Written = Annotated[
     Annotated[str, Tag(_AS_TEXT)] | Annotated[ConnectionEntry, Tag(_AS_ENTRY)],
-    Discriminator(lambda given: _AS_ENTRY if isinstance(given, (Mapping, ConnectionEntry)) else _AS_TEXT),
+    Discriminator(_form),
 ]
 
 

@@ -35,12 +35,12 @@ _STARTED = ("exact", "approx")
 #: The variables that an FMU computes itself.
 _COMPUTED = ("output", "local", "calculatedParameter")
 #: The types of whole numbers, with what they can hold. An enumeration is one too.
-_WHOLE = {"Integer": (-(2**31), 2**31), "Enumeration": (-(2**31), 2**31)}
-_WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1)) for bits in (8, 16, 32, 64)}
-_WHOLE |= {f"UInt{bits}": (0, 2**bits) for bits in (8, 16, 32, 64)}
+WHOLE = {"Integer": (-(2**31), 2**31), "Enumeration": (-(2**31), 2**31)}
+WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1)) for bits in (8, 16, 32, 64)}
+WHOLE |= {f"UInt{bits}": (0, 2**bits) for bits in (8, 16, 32, 64)}
 _REAL = ("Real", "Float64", "Float32")
 #: The types that are exchanged and recorded.
-_TYPES = (*_REAL, *_WHOLE, "Boolean", "String")
+_TYPES = (*_REAL, *WHOLE, "Boolean", "String")
 #: The causalities of what can be read.
 READABLE = ("output", "input", "local", "parameter", "calculatedParameter", "structuralParameter", "independent")
 
@@ -62,8 +62,8 @@ def _accepts(kind: str, value: Any) -> bool:
     # To Python a truth value is a number; to a person it is not.
     if isinstance(value, bool):
         return kind == "Boolean"
-    if kind in _WHOLE:
-        least, above = _WHOLE[kind]
+    if kind in WHOLE:
+        least, above = WHOLE[kind]
         return isinstance(value, int) and least <= value < above
     if kind in _REAL:
         return isinstance(value, (int, float))

@@ -1,6 +1,8 @@
 """timeseries.csv: scalars and probes after every accepted step."""
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Mapping
+from itertools import chain
 from math import isnan, nan
 from pathlib import Path
 from typing import Any
@@ -43,10 +45,11 @@ class TimeSeries:
         self._recorded = recorded(participants)
         self.columns = ["time_ms"]
         self.texts: set[str] = set()
-        names = ["time_ms", *(port.column for _, port in self._recorded)]
-        for unit, port in self._recorded:
-            stem, suffix = f"{unit}." if names.count(port.column) > 1 else "", port.column.removeprefix(port.name)
-            own = [f"{stem}{name}{suffix}" for name in self._names(port)]
+        plain = [self._columns(port) for _, port in self._recorded]
+        times = Counter(["time_ms", *chain.from_iterable(plain)])
+        for (unit, port), own in zip(self._recorded, plain, strict=True):
+            if any(times[name] > 1 for name in own):
+                own = [f"{unit}.{name}" for name in own]
             self.columns += own
             if port.type == "String":
                 self.texts.update(own)
@@ -63,7 +66,7 @@ class TimeSeries:
         for unit, port in self._recorded:
             if unit in step.waiting:
                 # Not computed at this time: an empty cell, not a value of some time before.
-                row += [nan for _ in self._names(port)]
+                row += [nan] * len(self._columns(port))
             else:
                 row += self._cells(port, exchange.value(unit, port.name))
         self.rows.append(row)
@@ -82,11 +85,12 @@ class TimeSeries:
         """Close the file."""
         self._table.close()
 
-    def _names(self, port: Port) -> Iterable[str]:
-        """The columns of a port, without its unit of measure."""
+    def _columns(self, port: Port) -> list[str]:
+        """The columns of a port, each with its unit of measure."""
+        names = port.elements
         if port.record == "probes":
-            return [f"{port.name}_{probe}" for probe in self._probes.names] if self._probes else []
-        return port.elements
+            names = iter([f"{port.name}_{probe}" for probe in self._probes.names] if self._probes else [])
+        return [f"{name}{port.column.removeprefix(port.name)}" for name in names]
 
     def _cells(self, port: Port, values: Values) -> list[Cell]:
         if port.record == "probes":
