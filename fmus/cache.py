@@ -1,5 +1,7 @@
 """FMUs built once: kept in the user's cache, or in a folder of their choice, never in the installed package."""
 
+import errno
+import zipfile
 from pathlib import Path
 
 from platformdirs import user_cache_path
@@ -15,11 +17,32 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
     """The FMU of `unit` on `mesh`, built if there is none of the same content, for FMI 2.0 or (`fmi` is 3) FMI 3.0.
 
     The fingerprint of code and mesh is part of the path, so that an FMU of other code or of another mesh is never
-    taken. Without `folder` it is `fmus` in the user's cache of this program.
+    taken. One that is damaged, or that cannot be read, is built anew; as every FMU takes its place in one piece, two
+    builders at once do no harm. Without `folder` it is `fmus` in the user's cache of this program.
+
+    OSError where the FMU cannot be built there.
     """
-    root = folder if folder is not None else user_cache_path("cardiac-cosim") / "fmus"
+    root = folder if folder is not None else _user_cache() / "fmus"
     if fmi not in (2, 3):
         raise ValueError(f"there are FMUs of FMI 2 and 3, not {fmi}")
     key, build = (fingerprint(unit, mesh), build_fmu) if fmi == 2 else (fingerprint_fmi3(unit, mesh), build_fmi3)
     path = root / key[:16] / f"{unit.name}.fmu"
-    return path if path.is_file() else build(unit, mesh, path)
+    return path if _whole(path) else build(unit, mesh, path)
+
+
+def _user_cache() -> Path:
+    path = user_cache_path("cardiac-cosim")
+    # Where nobody knows a home folder it would be one called `~`, below the folder that the person is in.
+    if not path.is_absolute():
+        raise FileNotFoundError(errno.ENOENT, "there is no home folder for a cache", str(path))
+    return path
+
+
+def _whole(path: Path) -> bool:
+    """Whether there is an FMU at `path`, readable and with all its bytes as they were written."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "modelDescription.xml" in archive.namelist() and archive.testzip() is None
+    # A damaged archive ends in whatever its damaged part is taken for: a kind of compression, an encryption, a size.
+    except Exception:
+        return False

@@ -11,9 +11,10 @@ from ..fmus.container import write_container
 from ..fmus.osp import write_osp
 from ..fmus.ssp import write_ssp
 from ..fmus.system import System
+from .assembly import checked_mesh
 from .errors import InputError
 from .participants.native import Mesh, fmu_of_unit, packed_mesh
-from .run import checked_mesh, make_folder
+from .results.writing import make_folder
 from .scenario import Scenario
 from .system import MESH, beyond_the_standard, system_of
 

@@ -50,8 +50,7 @@ def run(
     figures: Annotated[bool, typer.Option(help="Draw the figures when the run is done.")] = True,
 ) -> None:
     """Run a scenario and write time series, fields, coupling log, summary and figures."""
-    # Imported here, so that help and errors in the scenario do not wait for plotting and FMI libraries.
-    from .results.figures import draw_figures
+    # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
     from .run import run_scenario
 
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
@@ -60,15 +59,14 @@ def run(
         console = Console(stderr=True)
         with _about(file):
             try:
-                outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume)
+                outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume, figures)
             except Interrupted as error:
                 print(
                     f"interrupted; the results so far are in {folder}, to be continued with --resume", file=sys.stderr
                 )
                 raise typer.Exit(INTERRUPTED + error.signal) from None
-    if figures:
-        with console.status("drawing the figures"):
-            draw_figures(outcome.folder)
+    for warning in outcome.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     _report(scenario, outcome.folder, outcome.summary)
 
 

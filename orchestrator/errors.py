@@ -2,6 +2,10 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .coupling.schemes import Sweeps
 
 from .untrusted.quoting import shortened
 
@@ -11,7 +15,14 @@ class InputError(Exception):
 
 
 class RunError(Exception):
-    """The physics or the coupling failed (exit code 3). The message says which unit, when, why and what to try."""
+    """The physics, the coupling or the operating system failed (exit code 3).
+
+    The message says which unit, when, why and what to try. Where an iteration failed, `sweeps` are those of the step
+    to `time_ms` that was not accepted.
+    """
+
+    time_ms: float | None = None
+    sweeps: "Sweeps | None" = None
 
 
 class Interrupted(Exception):
@@ -33,6 +44,12 @@ class ParticipantError(Exception):
 
 class ParticipantLost(ParticipantError):
     """A participant is gone for good: its process died, or it did not come back in time."""
+
+
+class ParticipantTerminated(ParticipantError):
+    """A participant asks for the end of the simulation; `time_s` is the last time it reached, where it says so."""
+
+    time_s: float | None = None
 
 
 class NotConverged(Exception):

@@ -1,34 +1,20 @@
 """A whole run: scenario in, results folder out."""
 
-import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from .checkpoint import Checkpoint, read_checkpoint
-from .coupling.build import build_master, build_scheme
-from .coupling.connections import connect
-from .coupling.master import Observer
+from .assembly import assemble, called_directly, checked_mesh
 from .errors import InputError, Interrupted, RunError
-from .participants.native import Mesh, check_unit, fmu_of_unit, scene_mesh
-from .participants.participant import Participant
-from .participants.recipe import Recipe
-from .probes import Probes
 from .progress import ProgressBar
-from .results.coupling_log import CouplingLog
-from .results.fields import Fields
-from .results.iteration_log import IterationLog
-from .results.profile import Profile
-from .results.recorder import Recorder
-from .results.summary import write_summary
-from .results.time_series import TimeSeries
-from .results.writing import remove_stale
-from .scenario import Scenario, UnitEntry
+from .results.folder import ResultsFolder
+from .results.origin import Origin
+from .scenario import Scenario
 from .show import describe
 from .stopping import StopRequest
 from .wall_clock import WallClock
@@ -36,10 +22,11 @@ from .wall_clock import WallClock
 
 @dataclass(frozen=True)
 class Outcome:
-    """The results folder of a run and its summary."""
+    """The results folder of a run and its summary; `warnings` are what could not be done beside."""
 
     folder: Path
     summary: dict[str, Any]
+    warnings: tuple[str, ...] = ()
 
 
 def run_scenario(
@@ -49,193 +36,91 @@ def run_scenario(
     console: Console | None = None,
     fmu_dir: Path | None = None,
     resume: bool = False,
+    figures: bool = False,
 ) -> Outcome:
     """Run `scenario`, whose paths are relative to `base`, and write the results to `output`.
 
     Progress goes to `console`; FMUs are taken from `fmu_dir`, or from the user's cache. With `resume` the run goes on
-    from the last checkpoint in `output`, if there is one, and ends as if it had never stopped.
+    from the last checkpoint in `output`, if there is one, and ends as if it had never stopped. `figures` are drawn
+    when it is done.
 
     Raises
     ------
     InputError
         Before anything is computed, and before anything in `output` is touched.
     RunError
-        When a unit fails; everything up to the last good step is in `output` then.
+        When a unit fails, or the operating system refuses to write; everything up to the last good step is in
+        `output` then.
     Interrupted
         When a signal asked for it.
     """
     started = time.perf_counter()
-    if resume and (complete := _complete(output, scenario)) is not None:
-        return Outcome(output, complete)
+    console = console or Console(quiet=True)
+    with ResultsFolder(output, Origin.of(scenario, base)) as folder:
+        summary = folder.complete() if resume else None
+        if summary is None:
+            summary = _run(folder, scenario, base, console, fmu_dir, resume, started)
+        return Outcome(output, summary, _draw(output, console) if figures else ())
+
+
+def _run(
+    folder: ResultsFolder,
+    scenario: Scenario,
+    base: Path,
+    console: Console,
+    fmu_dir: Path | None,
+    resume: bool,
+    started: float,
+) -> dict[str, Any]:
+    before = folder.checkpoint() if resume else None
     mesh = checked_mesh(scenario, base)
-    probes = None if mesh is None else Probes(mesh, scenario.output.probes_mm)
-    make_folder(output, "--output")
-    resumed = read_checkpoint(output, scenario) if resume else None
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
-        participants = make_participants(stack, scenario, base, mesh, fmu_dir)
-        connections = connect(participants, scenario.connections, scenario.connect_by_name)
-        scheme, converged = build_scheme(scenario.coupling, participants, connections)
-        master = build_master(scenario, participants, connections, scheme)
+        assembly = assemble(stack, scenario, base, mesh, fmu_dir)
+        master = assembly.master
         ready = time.perf_counter()
         unready = None
         try:
-            if resumed is None:
+            if before is None:
                 master.initialise()
             else:
-                master.resume(resumed["master"])
+                with folder.fitting():
+                    master.resume(before["master"])
         except RunError as error:
+            if before is not None:
+                raise InputError(f"{folder.path}: {error}; run without --resume to begin anew") from error
             unready = error
-        # Nothing in `output` was touched up to here.
-        before = resumed or {}
-        recorders: dict[str, Recorder] = {}
-        # The fields first: a value that is not finite ends the step before the time series has a row of it.
-        fields = None if mesh is None else Fields(output, participants, mesh, before.get("fields"))
-        if fields is not None:
-            recorders["fields"] = fields
-        series = TimeSeries(output, participants, probes, before.get("series"))
-        log = CouplingLog(output, master.units, converged, before.get("log"))
-        recorders |= {"series": series, "log": log}
-        if converged:
-            recorders["iterations"] = IterationLog(output, converged, before.get("iterations"))
-        for recorder in recorders.values():
-            stack.enter_context(closing(recorder))
-        profile = stack.enter_context(closing(Profile(output, list(participants))))
-        wall = WallClock(master.watch, list(participants), started, ready, before.get("wall"))
-        remove_stale(output / "summary.json")
-        bar = stack.enter_context(ProgressBar(console or Console(quiet=True), scenario.name, scenario.run.stop_ms))
-        memories = {"master": master.memory, "wall": wall.memory}
-        memories |= {name: recorder.memory for name, recorder in recorders.items()}
-        checkpoint = Checkpoint(output, scenario, scenario.run.checkpoint_every, memories)
-        keeps = scenario.run.checkpoint_every > 0 and all(
-            participants[unit].abilities.serializes for unit in master.units
-        )
-        if resumed is None:
-            checkpoint.remove()
-        outcome: dict[str, Any] = {"status": "interrupted"}
-        try:
+        # Nothing in the folder was touched up to here.
+        wall = partial(WallClock, master.watch, list(assembly.participants), started, ready)
+        recording = folder.record(assembly, before, wall)
+        bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
+        with recording, bar:
             if unready is not None:
                 raise unready
-            observers: list[Observer] = [*recorders.values(), profile, bar, *([checkpoint] if keeps else [])]
-            master.run(observers, stop)
+            master.run([recording, bar], stop)
             if stop.signal is not None and not master.done:
-                if keeps:
-                    checkpoint.write()
+                recording.keep()
                 raise Interrupted(stop.signal)
-            outcome = {"status": "done"}
-        except RunError as error:
-            outcome = {"status": "failed", "message": str(error)}
-            raise
-        finally:
-            # In this order a process may end anywhere: what the summary calls done is complete, and as long as it does
-            # not, the checkpoint and what belongs to it are there.
-            for recorder in recorders.values():
-                recorder.close()
-            resumable = keeps and outcome["status"] != "done"
-            outcome |= {"unconverged_ms": log.unconverged, "resumable": resumable}
-            summary = write_summary(output / "summary.json", scenario, series, wall.seconds(), outcome)
-            if not resumable:
-                _forget(checkpoint, fields)
-    return Outcome(output, summary)
+    return recording.summary
+
+
+def _draw(output: Path, console: Console) -> tuple[str, ...]:
+    """Draw the figures; the warnings of those that cannot be."""
+    # Imported here, so that whoever draws nothing does not wait for the plotting library.
+    from .results.figures import draw_figures
+
+    try:
+        with console.status("drawing the figures"):
+            draw_figures(output)
+    except OSError as error:
+        place = error.filename or output / "figures"
+        return (f"the figures cannot be drawn: {place}: {error.strerror or error}; all other results are complete",)
+    return ()
 
 
 def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -> str:
     """What `scenario` builds, exchanges and solves, in words; nothing is computed but the mesh."""
     mesh = checked_mesh(scenario, base)
-    if mesh is not None:
-        Probes(mesh, scenario.output.probes_mm)
     with ExitStack() as stack:
-        participants = make_participants(stack, called_directly(scenario), base, mesh, fmu_dir)
-        connections = connect(participants, scenario.connections, scenario.connect_by_name)
-        scheme, _ = build_scheme(scenario.coupling, participants, connections)
-        build_master(scenario, participants, connections, scheme)
-        return describe(scenario, mesh, participants, connections)
-
-
-def called_directly(scenario: Scenario) -> Scenario:
-    """The same with units called directly in this process: they show what their FMUs show."""
-    run = scenario.run.model_copy(update={"participants": "native", "workers": None})
-    return scenario.model_copy(update={"run": run})
-
-
-def _forget(checkpoint: Checkpoint, fields: Fields | None) -> None:
-    checkpoint.remove()
-    if fields is not None:
-        fields.forget()
-
-
-def _complete(output: Path, scenario: Scenario) -> dict[str, Any] | None:
-    """The summary in `output`, if that is of this scenario, complete."""
-    try:
-        summary: dict[str, Any] = json.loads((output / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    same = summary.get("scenario") == json.loads(json.dumps(scenario.resolved()))
-    return summary if same and summary.get("status") == "done" else None
-
-
-def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
-    """The mesh of `scenario`, if it has one; InputError for a scene, unit or parameter that does not exist."""
-    for name, entry in scenario.units.items():
-        if entry.unit is not None:
-            with _naming(f"units.{name}"):
-                check_unit(entry.unit, entry.parameters)
-    if scenario.scene is None:
-        return None
-    with _naming("scene"):
-        return scene_mesh(scenario.scene, base)
-
-
-def make_participants(
-    stack: ExitStack, scenario: Scenario, base: Path, mesh: Mesh | None, fmu_dir: Path | None = None
-) -> dict[str, Participant]:
-    """All participants, in this process or in workers, closed with the `stack`."""
-    if fmu_dir is not None:
-        make_folder(fmu_dir, "--fmu-dir")
-    make: Callable[[Recipe], Participant] = Recipe.make
-    if scenario.run.workers is not None:
-        # Imported here: who works alone need not wait for it.
-        from .participants.workers import Workers
-
-        workers = Workers(scenario.run.workers, len(scenario.units), scenario.run.unit_time_limit_s)
-        make = stack.enter_context(workers).make
-    participants = {}
-    for name, entry in scenario.units.items():
-        recipe = _recipe(name, entry, scenario, base, mesh, fmu_dir)
-        participants[name] = stack.enter_context(closing(make(recipe)))
-    return participants
-
-
-def _recipe(
-    name: str, entry: UnitEntry, scenario: Scenario, base: Path, mesh: Mesh | None, fmu_dir: Path | None
-) -> Recipe:
-    parameters, ramps = dict(entry.parameters), scenario.coupling.interpolation == "linear"
-    if entry.fmu is not None:
-        return Recipe(name, parameters, ramps, fmu=base / entry.fmu, start=dict(entry.start))
-    if mesh is None or entry.unit is None:
-        raise TypeError("a scenario without a scene has FMUs only")
-    if scenario.run.participants == "native":
-        return Recipe(name, parameters, ramps, unit=entry.unit, mesh=mesh)
-    fmi = 3 if scenario.run.participants == "fmu3" else 2
-    return Recipe(name, parameters, ramps, fmu=fmu_of_unit(entry.unit, mesh, fmu_dir, fmi))
-
-
-def make_folder(folder: Path, option: str) -> None:
-    """Make sure that files can be written to `folder`; InputError names the `option` that chooses another."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".writable"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise InputError(
-            f"the folder {folder} cannot be written ({error.strerror}); choose another with {option}"
-        ) from None
-
-
-@contextmanager
-def _naming(key: str) -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from None
+        assembly = assemble(stack, called_directly(scenario), base, mesh, fmu_dir, described=True)
+        return describe(scenario, mesh, assembly.participants, assembly.connections)

@@ -5,7 +5,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from .errors import InputError, did_you_mean
 from .untrusted.quoting import quoted, shortened
@@ -117,6 +126,52 @@ class UnitEntry(_Section):
         return self
 
 
+class ConnectionEntry(_Section):
+    """A connection in its parts: for names that cannot be told from what is around them, and for programs.
+
+    With `factor` or `offset` the input gets factor · value + offset, and units of measure are the writer's affair.
+    """
+
+    source: Annotated[str, Field(alias="from", min_length=1)]
+    output: Annotated[str, Field(min_length=1)]
+    target: Annotated[str, Field(alias="to", min_length=1)]
+    input: Annotated[str, Field(min_length=1)]
+    factor: Annotated[float | None, Field(allow_inf_nan=False)] = None
+    offset: Annotated[float | None, Field(allow_inf_nan=False)] = None
+
+    @property
+    def law(self) -> tuple[float, float] | None:
+        """Factor and offset; None where there are none."""
+        if self.factor is None and self.offset is None:
+            return None
+        return (1.0 if self.factor is None else self.factor), self.offset or 0.0
+
+
+#: How pydantic marks in which of its two forms a connection was read; no person has to see that.
+_AS_TEXT, _AS_ENTRY = "[text]", "[entry]"
+
+
+def _form(given: Any) -> str:
+    """A mapping with none of the keys is a text that was broken at its colon."""
+    is_entry = isinstance(given, ConnectionEntry) or (
+        isinstance(given, Mapping) and not {"from", "output", "to", "input"}.isdisjoint(given)
+    )
+    return _AS_ENTRY if is_entry else _AS_TEXT
+
+
+#: A connection as 'unit.output -> unit.input', or in its parts.
+Written = Annotated[
+    Annotated[str, Tag(_AS_TEXT)] | Annotated[ConnectionEntry, Tag(_AS_ENTRY)],
+    Discriminator(_form),
+]
+
+
+class Inputs(_Section):
+    """Signals that drive inputs: the columns of a CSV file."""
+
+    file: Annotated[str, Field(min_length=1)]
+
+
 class CriterionEntry(_Section):
     """When a field counts as converged; of several measures any one is enough."""
 
@@ -199,9 +254,14 @@ class Run(_Section):
 
 
 class Output(_Section):
-    """What is kept, and how often."""
+    """What is kept, and how often.
+
+    `variables` are those that the time series has, `unit.variable`, where `*` and `?` stand for any characters; if none
+    are given, it has what the units' outputs ask for.
+    """
 
     every_ms: Positive = 5.0
+    variables: Annotated[list[str] | None, Field(min_length=1)] = None
     probes_mm: dict[Annotated[str, Field(pattern=_PROBE_NAME), AfterValidator(_name)], Point] = Field(
         default_factory=dict
     )
@@ -211,6 +271,7 @@ class Scenario(_Section):
     """A whole scenario.
 
     `connections` are those that are written; with `connect_by_name` every other input is fed by the output of its name.
+    `inputs` drive what is not connected.
     """
 
     name: Annotated[str, Field(pattern=_NAME), AfterValidator(_name)]
@@ -218,8 +279,9 @@ class Scenario(_Section):
     units: Annotated[
         dict[Annotated[str, Field(pattern=_UNIT_NAME), AfterValidator(_name)], UnitEntry], Field(min_length=1)
     ]
-    connections: list[str] = Field(default_factory=list)
+    connections: list[Written] = Field(default_factory=list)
     connect_by_name: bool = True
+    inputs: Inputs | None = None
     coupling: Coupling = Coupling()
     run: Run = Run()
     output: Output = Output()
@@ -231,6 +293,19 @@ class Scenario(_Section):
             raise ValueError(f"the key 'scene' is missing; unit '{own[0]}' needs a mesh")
         if self.scene is None and self.output.probes_mm:
             raise ValueError("`output.probes_mm` needs a `scene`, whose mesh the points lie in; remove it")
+        return self
+
+    @model_validator(mode="after")
+    def _observed(self) -> "Scenario":
+        for text in self.output.variables or ():
+            unit, _, variable = text.partition(".")
+            if unit not in self.units:
+                raise ValueError(
+                    f"`output.variables`: {quoted(text)} is of no unit{did_you_mean(unit, self.units)}; "
+                    "write unit.variable, or unit.* for all"
+                )
+            if not variable:
+                raise ValueError(f"`output.variables`: {quoted(text)} names no variable; write {unit}.* for all")
         return self
 
     @model_validator(mode="after")
@@ -263,6 +338,17 @@ class Scenario(_Section):
                 f"more than {_MOST_STEPS:.0e} are refused; change one of them"
             )
 
+    def observed(self, unit: str) -> tuple[str, ...]:
+        """What of a unit the time series is to have, as `output.variables` has it; empty where nothing is said."""
+        pairs = (text.partition(".") for text in self.output.variables or ())
+        return tuple(variable for name, _, variable in pairs if name == unit)
+
+    def files(self) -> list[str]:
+        """The files that the scenario names, beside its own, as it names them."""
+        named = [None if self.scene is None else self.scene.mesh, *(entry.fmu for entry in self.units.values())]
+        named.append(None if self.inputs is None else self.inputs.file)
+        return list(dict.fromkeys(name for name in named if name is not None))
+
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out; it can be loaded again."""
         without: dict[str, set[str]] = {}
@@ -271,6 +357,10 @@ class Scenario(_Section):
         content = self.model_dump(exclude=without or None, by_alias=True)
         if self.scene is None:
             del content["scene"]
+        if self.inputs is None:
+            del content["inputs"]
+        if self.output.variables is None:
+            del content["output"]["variables"]
         return content
 
 
@@ -344,7 +434,7 @@ def _assign(content: dict[str, Any], assignment: str) -> None:
 
 
 def _explain(problem: Mapping[str, Any]) -> str:
-    location = [shortened(str(part)) for part in problem["loc"] if part != "[key]"]
+    location = [shortened(str(part)) for part in problem["loc"] if part not in ("[key]", _AS_TEXT, _AS_ENTRY)]
     kind, given = problem["type"], problem["input"]
     key, is_key = ".".join(location), "[key]" in problem["loc"]
     context = problem.get("ctx", {})
@@ -401,6 +491,7 @@ def _short(given: Any) -> str:
 def _keys_at(location: Sequence[str]) -> list[str]:
     """The keys that the section at `location` may have."""
     sections: dict[str, type[BaseModel]] = {"scene": Scene, "coupling": Coupling, "run": Run, "output": Output}
+    sections |= {"connections": ConnectionEntry, "inputs": Inputs}
     section = UnitEntry if location[:1] == ["units"] else sections.get(location[0], Scenario) if location else Scenario
     if location[:2] == ["coupling", "adaptive"]:
         section = Adaptive

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..coupling.exchange import Exchange
 from ..coupling.master import MASTER, Accepted
+from .names import COUPLING
 from .table import Table
 
 
@@ -26,30 +27,46 @@ class CouplingLog:
         converged: Sequence[str] = (),
         resumed: Mapping[str, Any] | None = None,
     ) -> None:
-        self.unconverged: list[float] = [] if resumed is None else resumed["unconverged"].tolist()
         self._units = units
         self._converged = converged
         residuals = [f"residual_{name}" for name in converged]
         seconds = [f"seconds_{unit}" for unit in (*units, MASTER)]
         columns = ["time_ms", "step_ms", "iterations", *residuals, "contraction_rate", "rejected", *seconds]
-        self._table = Table(folder / "coupling.csv", columns, None if resumed is None else int(resumed["rows"]))
+        self._table = Table(folder / COUPLING, columns, resumed and resumed["table"])
+        times = [float(row[0]) for row in self._table.rows()]
+        self._rows = len(times)
+        # First and last row of each stretch of steps that had not converged: what is kept does not grow with it.
+        self._stretches: list[tuple[int, int]] = []
+        if resumed is not None:
+            self._stretches = [(int(first), int(last)) for first, last in resumed["unconverged"].reshape(-1, 2)]
+        self.unconverged = [time for first, last in self._stretches for time in times[first : last + 1]]
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
         """See Observer; the initial state is no step."""
         if step.number:
             seconds = [step.seconds[unit] for unit in (*self._units, MASTER)]
-            if not step.sweeps.converged:
-                self.unconverged.append(step.time_ms)
             sweeps = step.sweeps
             # A loop one of whose units did not step in this exchange was none.
             residuals = [sweeps.residuals.get(name) for name in self._converged]
             first = [step.time_ms, step.size_ms, sweeps.iterations, *residuals, sweeps.contraction_rate, step.rejected]
             self._table.add([*first, *seconds])
+            if not sweeps.converged:
+                self._note(step.time_ms)
+            self._rows += 1
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
-        return {"rows": self._table.rows, "unconverged": np.array(self.unconverged)}
+        return {"table": self._table.memory(), "unconverged": np.array(self._stretches, np.int64)}
 
     def close(self) -> None:
         """Close the file."""
         self._table.close()
+
+    def _note(self, time_ms: float) -> None:
+        """The step of the next row, to `time_ms`, was accepted without having converged."""
+        self.unconverged.append(time_ms)
+        before = self._stretches[-1] if self._stretches else None
+        if before is not None and before[1] == self._rows - 1:
+            self._stretches[-1] = (before[0], self._rows)
+        else:
+            self._stretches.append((self._rows, self._rows))

@@ -11,8 +11,7 @@ copied into fields.h5. Of runs with hundreds of frames it is not written anew fo
 grows with the square of their number.
 """
 
-import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -23,7 +22,10 @@ from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..participants.native import Mesh
 from ..participants.participant import Participant, Port, Values
+from .hdf5 import write_streamed
+from .names import FIELDS, PARTS, XDMF
 from .parts import Parts
+from .whole import replacing
 from .writing import remove_stale, writing
 
 #: How XDMF calls the elements, by dimension.
@@ -56,10 +58,10 @@ class Fields:
         self._open = True
         self._named = _named(participants)
         self._mesh = mesh
-        self._path, self._xdmf = folder / "fields.h5", folder / "fields.xdmf"
+        self._path, self._xdmf = folder / FIELDS, folder / XDMF
         if resumed is None:
             remove_stale(self._xdmf)
-        self._parts = Parts(folder / "fields.parts", 0 if resumed is None else int(resumed["frames"]))
+        self._parts = Parts(folder / PARTS, 0 if resumed is None else int(resumed["frames"]))
         self._fixed: dict[str, Values] = {} if resumed is None else dict(resumed.get("fixed", {}))
         # How many frames fields.h5 has or refers to.
         self._referred = len(self._parts.times)
@@ -95,48 +97,55 @@ class Fields:
         """Remove the parts: after `close`, when there is nothing to go on from."""
         self._parts.remove()
 
-    def _write(self, frames: Any) -> None:
-        """Write fields.h5 anew, with the `frames` put in, and replace the old one by it."""
+    def _write(self, add_frames: Callable[[h5py.File], None]) -> None:
+        """Write fields.h5 anew, with the frames added, and replace the old one by it."""
         self._referred = len(self._parts.times)
-        unfinished = self._path.with_suffix(".part")
-        with h5py.File(unfinished, "w") as file:
+
+        def fill(file: h5py.File) -> None:
             file["points_mm"] = self._mesh.points
             file["cells"] = self._mesh.cells
             file["frames_ms"] = self._parts.times
             for name, values in self._fixed.items():
                 file[name] = values
-            for name, _, port in self._named:
-                if not port.fixed:
-                    frames(file, name, port.shape)
-        os.replace(unfinished, self._path)
+            add_frames(file)
 
-    def _refer(self, file: h5py.File, name: str, shape: tuple[int, ...]) -> None:
-        count = len(self._parts.times)
-        series = _layout((count, *shape))
-        for frame in range(count):
-            path = self._parts.path(frame)
-            reference = f"{path.parent.name}/{path.name}"
-            series[frame] = h5py.VirtualSource(reference, name, shape, "f8")
-            file[f"views/{frame}/{name}"] = h5py.ExternalLink(reference, name)
-        file.create_virtual_dataset(f"frames/{name}", series)
+        write_streamed(self._path, fill)
 
-    def _copy(self, file: h5py.File, name: str, shape: tuple[int, ...]) -> None:
+    def _refer(self, file: h5py.File) -> None:
         count = len(self._parts.times)
-        series = file.create_dataset(
-            f"frames/{name}", (count, *shape), maxshape=(None, *shape), chunks=(1, *shape), dtype="f8"
-        )
+        for name, shape in self._moving():
+            series = _layout((count, *shape))
+            for frame in range(count):
+                path = self._parts.path(frame)
+                reference = f"{path.parent.name}/{path.name}"
+                series[frame] = h5py.VirtualSource(reference, name, shape, "f8")
+                file[f"views/{frame}/{name}"] = h5py.ExternalLink(reference, name)
+            file.create_virtual_dataset(f"frames/{name}", series)
+
+    def _copy(self, file: h5py.File) -> None:
+        count = len(self._parts.times)
+        for name, shape in self._moving():
+            series = file.create_dataset(
+                f"frames/{name}", (count, *shape), maxshape=(None, *shape), chunks=(1, *shape), dtype="f8"
+            )
+            for frame in range(count):
+                window = _layout(shape)
+                window[...] = h5py.VirtualSource(".", f"frames/{name}", series.shape)[frame]
+                file.create_virtual_dataset(f"views/{frame}/{name}", window)
         for frame in range(count):
-            series[frame] = self._parts.read(frame, name)
-            window = _layout(shape)
-            window[...] = h5py.VirtualSource(".", f"frames/{name}", series.shape)[frame]
-            file.create_virtual_dataset(f"views/{frame}/{name}", window)
+            with self._parts.open(frame) as part:
+                for name, _ in self._moving():
+                    file[f"frames/{name}"][frame] = part[name][...]
+
+    def _moving(self) -> list[tuple[str, tuple[int, ...]]]:
+        return [(name, port.shape) for name, _, port in self._named if not port.fixed]
 
     def _write_xdmf(self) -> None:
         root = Element("Xdmf", Version="3.0")
         series = SubElement(SubElement(root, "Domain"), "Grid", GridType="Collection", CollectionType="Temporal")
         for frame, time in enumerate(self._parts.times):
             grid = SubElement(series, "Grid", Name="mesh")
-            SubElement(grid, "Time", Value=f"{time:.17g}")
+            SubElement(grid, "Time", Value=repr(time))
             elements = {"NumberOfElements": str(self._mesh.elements)}
             topology = SubElement(grid, "Topology", elements | _TOPOLOGIES[self._mesh.dimension])
             self._item(topology, "cells", self._mesh.cells.shape, "Int")
@@ -149,9 +158,8 @@ class Fields:
                 self._item(attribute, name if port.fixed else f"views/{frame}/{name}", port.shape, "Float")
         tree = ElementTree(root)
         indent(tree)
-        part = self._xdmf.with_suffix(".part")
-        tree.write(part, encoding="utf-8", xml_declaration=True)
-        part.replace(self._xdmf)
+        with replacing(self._xdmf) as part:
+            tree.write(part, encoding="utf-8", xml_declaration=True)
 
     def _item(self, parent: Element, name: str, shape: tuple[int, ...], kind: str) -> None:
         dimensions = " ".join(map(str, shape))

@@ -2,12 +2,15 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from ..coupling.exchange import Exchange
 from ..coupling.master import MASTER, WAITING, Accepted
-from .writing import writing
+from ..stopwatch import Span
+from .appended import AppendedFile
+from .names import PROFILE
 
 _US_PER_S = 1e6
 
@@ -20,33 +23,35 @@ class Profile:
 
     def __init__(self, folder: Path, units: Sequence[str]) -> None:
         self._rows = {label: number for number, label in enumerate([MASTER, *units])}
-        with writing(folder / "profile.json"):
-            self._file = (folder / "profile.json").open("w", encoding="utf-8")
-        self._file.write("[\n")
+        self._file = AppendedFile(folder / PROFILE)
+        self._file.append(b"[\n")
         self._add({"name": "process_name", "ph": "M", "args": {"name": "cosim"}})
         for label, number in self._rows.items():
             self._add({"name": "thread_name", "ph": "M", "tid": number, "args": {"name": label}})
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
         """See Observer."""
-        for span in step.spans:
-            if span.label != WAITING:
-                self._add(
-                    {
-                        "name": span.what,
-                        "ph": "X",
-                        "tid": self._rows[span.label],
-                        "ts": span.begin * _US_PER_S,
-                        "dur": span.seconds * _US_PER_S,
-                        "args": {"time_ms": step.time_ms},
-                    }
-                )
-        self._file.flush()
+        spans = [span for span in step.spans if span.label != WAITING]
+        self._file.append(b"".join(_line(self._span(span, step.time_ms)) for span in spans))
 
     def close(self) -> None:
         """End the list and close the file."""
-        self._add({"name": "end", "ph": "M"}, end="\n]\n")
-        self._file.close()
+        with closing(self._file):
+            self._file.append(_line({"name": "end", "ph": "M"}, end="\n]\n"))
 
-    def _add(self, event: dict[str, Any], end: str = ",\n") -> None:
-        self._file.write(json.dumps({"pid": 1, **event}) + end)
+    def _add(self, event: dict[str, Any]) -> None:
+        self._file.append(_line(event))
+
+    def _span(self, span: Span, time_ms: float) -> dict[str, Any]:
+        return {
+            "name": span.what,
+            "ph": "X",
+            "tid": self._rows[span.label],
+            "ts": span.begin * _US_PER_S,
+            "dur": span.seconds * _US_PER_S,
+            "args": {"time_ms": time_ms},
+        }
+
+
+def _line(event: dict[str, Any], end: str = ",\n") -> bytes:
+    return (json.dumps({"pid": 1, **event}) + end).encode()

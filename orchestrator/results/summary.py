@@ -1,33 +1,42 @@
 """summary.json: the run in a few numbers, and the scenario it came from."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from math import isnan
 from pathlib import Path
-from platform import python_version
 from typing import Any
 
 from ..scenario import Scenario
+from .origin import Origin
 from .time_series import TimeSeries
+from .whole import write_whole
 
 #: Potential in mV whose upward crossing at a probe is its activation.
 ACTIVATION_MV = -20.0
 
-_PACKAGES = ("cardiac-cosim", "fmpy", "pythonfmu", "scikit-fem", "scipy", "numpy", "meshio", "h5py")
+#: The kinds of what every summary has and whoever reads one relies on.
+_KINDS: dict[str, type | tuple[type, ...]] = {
+    "end_ms": (int, float),
+    "steps": int,
+    "activation_time_ms": dict,
+    "ejection_fraction": dict,
+    "unconverged_ms": list,
+    "wall_s": dict,
+}
 
 
 def write_summary(
     path: Path,
     scenario: Scenario,
+    origin: Origin,
     series: TimeSeries,
     seconds: Mapping[str, Any],
     outcome: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Write the summary of a finished or failed run and return it.
 
-    `seconds` has the keys `total`, `master`, `units` (by name) and whatever else was timed; `outcome` has `status`.
+    `origin` says what the numbers come from. `seconds` has the keys `total`, `master`, `units` (by name) and whatever
+    else was timed; `outcome` has `status`.
     """
     time = series.column("time_ms")
 
@@ -48,6 +57,8 @@ def write_summary(
     }
     ejected = {}
     for column in series.columns[1:]:
+        if column in series.texts:
+            continue
         _, values = _columns(known(column))
         # An output of a foreign FMU may have the name of one of the summary's own keys, which wins.
         if values and not column.startswith("potential_") and column not in content:
@@ -57,12 +68,16 @@ def write_summary(
     content["ejection_fraction"] = ejected
     content["wall_s"] = dict(seconds)
     content["master_overhead"] = seconds["master"] / seconds["total"] if seconds["total"] else None
-    content["versions"] = {"python": python_version(), **{name: version(name) for name in _PACKAGES}}
-    content["scenario"] = scenario.resolved()
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    os.replace(part, path)
+    content |= origin.content()
+    write_whole(path, f"{json.dumps(content, indent=2, allow_nan=False)}\n".encode())
     return content
+
+
+def is_summary(content: Mapping[str, Any]) -> bool:
+    """Whether `content` has what the summary of a run that is done has."""
+    return all(isinstance(content.get(key), kind) for key, kind in _KINDS.items()) and isinstance(
+        content["wall_s"].get("total"), (int, float)
+    )
 
 
 def _columns(pairs: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:

@@ -1,43 +1,53 @@
 """A CSV file that is complete up to its last row at every moment."""
 
 import csv
-from collections.abc import Sequence
+import io
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from .writing import writing
+from .appended import AppendedFile
 
 
 class Table:
     """Rows under fixed columns, written through at once. Numbers keep all their digits; None leaves a cell empty.
 
-    With `kept` the file goes on after so many rows of an earlier run; what it had beyond them is removed.
+    With `resumed`, the `memory` of an earlier process, the file goes on after the rows of that; what it had beyond
+    them is removed.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str], kept: int | None = None) -> None:
-        self.rows = kept or 0
-        with writing(path):
-            if kept is None:
-                self._file = path.open("w", newline="", encoding="utf-8")
-            else:
-                self._file = path.open("r+", newline="", encoding="utf-8")
-        self._writer = csv.writer(self._file)
-        if kept is None:
-            self._writer.writerow(columns)
-        else:
-            for _ in range(kept + 1):
-                self._file.readline()
-            self._file.seek(self._file.tell())
-            self._file.truncate()
+    def __init__(self, path: Path, columns: Sequence[str], resumed: Mapping[str, Any] | None = None) -> None:
+        self._file = AppendedFile(path, resumed)
+        if resumed is None:
+            self._file.append(_line(columns))
 
-    def add(self, row: Sequence[float | int | None]) -> None:
+    def add(self, row: Sequence[float | int | str | None]) -> None:
         """Append a row and hand it to the operating system."""
-        # `item` makes plain numbers of NumPy's, whose repr is no number.
-        self._writer.writerow(["" if value is None else repr(np.asarray(value).item()) for value in row])
-        self._file.flush()
-        self.rows += 1
+        self._file.append(_line([_cell(value) for value in row]))
+
+    def rows(self) -> list[list[str]]:
+        """The cells of all rows."""
+        return list(csv.reader(io.StringIO(self._file.content().decode(), newline="")))[1:]
+
+    def memory(self) -> dict[str, Any]:
+        """For a checkpoint."""
+        return self._file.memory()
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def _line(cells: Sequence[str]) -> bytes:
+    text = io.StringIO(newline="")
+    csv.writer(text).writerow(cells)
+    return text.getvalue().encode()
+
+
+def _cell(value: float | int | str | None) -> str:
+    if value is None or isinstance(value, str):
+        return value or ""
+    # `item` makes plain numbers of NumPy's, whose repr is no number.
+    return repr(np.asarray(value).item())

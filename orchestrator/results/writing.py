@@ -1,10 +1,30 @@
-"""Files in the results folder: what an earlier run left must not pass for this one's, nor stand in its way."""
+"""What the operating system lets us write: refusals before a run, as they concern what the person chose."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError
+
+
+def make_folder(folder: Path, option: str) -> None:
+    """Make sure that files can be written to `folder`; InputError names the `option` that chooses another."""
+    with allowed(folder, option):
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".writable"
+        probe.touch()
+        probe.unlink()
+
+
+@contextmanager
+def allowed(folder: Path, option: str) -> Iterator[None]:
+    """Make an InputError of the operating system's refusal to write to `folder`, which `option` chooses."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"the folder {folder} cannot be written ({error.strerror}); choose another with {option}"
+        ) from None
 
 
 def remove_stale(path: Path) -> None:

@@ -5,14 +5,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import fmpy
-
-from ...fmus.layout import scalar_names
 from ..errors import InputError
-from ..participants.fmu_variables import real_fields
+from ..participants.fmu_description import Description, read_description
+from ..participants.fmu_file import FmuFile
+from ..participants.fmu_variables import fields
 from ..participants.participant import Port
-from ..untrusted.archive import open_archive
-from ..untrusted.document import parse_document
 from ..untrusted.quoting import shortened
 from .file import inside, named
 from .unit_conversion import Measure
@@ -54,33 +51,22 @@ class SystemComponent:
 
     @cached_property
     def scalars(self) -> dict[str, tuple[Port, int]]:
-        """By the name of a Real input or output, the field that it is part of, and its place in that."""
+        """By the name of an input or output, the field that it is part of, and its place in that."""
         return {
             scalar: (field.port, place)
-            for fields in real_fields(self.path, self.description.modelVariables, {})
-            for field in fields
-            for place, scalar in enumerate(scalar_names(field.port.name, field.port.shape))
+            for causality in ("input", "output")
+            for field in fields(self.description, (causality,), {}).values()
+            for place, scalar in enumerate(field.port.elements)
         }
 
     def measure(self, name: str) -> Measure | None:
         """The unit of the variable `name`, its own or that of its type, if it has one."""
-        variable = self.variables[name]
-        declared = None if variable.declaredType is None else variable.declaredType.unit
-        unit = declared if variable.unit is None else variable.unit
+        unit = self.variables[name].unit
         return None if unit is None else self.measures.get(unit, Measure(unit))
 
     def is_relative(self, name: str) -> bool:
         """Whether the variable `name` is a difference, of temperatures for instance, which has no offset."""
-        declared = self.variables[name].declaredType
-        return name in self._relative or bool(declared is not None and declared.relativeQuantity)
-
-    @cached_property
-    def _relative(self) -> set[str]:
-        # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
-        with open_archive(self.path) as archive:
-            root = parse_document(archive.read("modelDescription.xml"))
-        found = root.iterfind(".//ScalarVariable/Real[@relativeQuantity]")
-        return {real.getparent().get("name") for real in found if real.get("relativeQuantity") in ("true", "1")}
+        return bool(self.variables[name].relativeQuantity)
 
     @cached_property
     def measures(self) -> dict[str, Measure]:
@@ -94,17 +80,11 @@ class SystemComponent:
             yield unit.name, Measure.of(unit.name, base and {name: getattr(base, name) for name in names})
 
 
-def _described(path: Path, what: str) -> Any:
+def _described(path: Path, what: str) -> Description:
     try:
-        with open_archive(path) as archive:
-            parse_document(archive.read("modelDescription.xml"))
+        description = read_description(FmuFile(path))
     except InputError as error:
         raise InputError(f"{what}: {error}") from None
-    try:
-        description = fmpy.read_model_description(str(path), validate=False)
-    # FMPy raises plain Exceptions, and those of zip and XML readers.
-    except Exception as error:
-        raise InputError(f"{what}: FMPy cannot read it as an FMU ({shortened(str(error), 200)})") from None
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        raise InputError(f"{what}: not an FMI 2.0 co-simulation FMU; replace it by one")
+    if description.fmiVersion != "2.0":
+        raise InputError(f"{what}: an FMU of FMI {description.fmiVersion}; only those of FMI 2.0 are taken in packages")
     return description

@@ -1,6 +1,7 @@
-"""The connections of a system package, scalar by scalar, put together to those of whole fields."""
+"""The connections of a system package, scalar by scalar, put together to those of whole fields where they are some."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from ..coupling.connections import Connection, End, Law
 from ..errors import InputError
@@ -11,13 +12,16 @@ from .wiring import Wiring
 def connections(wiring: Wiring) -> Iterator[Connection]:
     """The connections between fields of components, however many systems lie between.
 
+    Fields that are connected in part, in another order or by several laws are connected element by element.
+
     Raises
     ------
     InputError
-        For transformations other than linear ones, units of measure that cannot be converted, parameters that an output
-        feeds, and fields that are connected in part only, or in another order.
+        For transformations other than linear ones, units of measure that cannot be converted, and parameters that an
+        output feeds.
     """
-    fields: dict[tuple[End, End], tuple[Port, Port, dict[int, tuple[int, Law | None]]]] = {}
+    fields: dict[tuple[End, End], list[_Scalar]] = {}
+    ports: dict[End, Port] = {}
     for target, pin, hops in wiring.fed():
         start = hops[0].source
         # What nobody feeds keeps a value: that is no connection.
@@ -28,14 +32,25 @@ def connections(wiring: Wiring) -> Iterator[Connection]:
             raise InputError(f"the parameter {pin} is connected to the output {start}; parameters keep their values")
         (output, at), (taken, place) = source.scalars[start.name], target.scalars[pin.name]
         law = wiring.law(hops, source.measure(start.name), source.is_relative(start.name))
-        places = fields.setdefault((End(source.unit, output.name), End(target.unit, taken.name)), (output, taken, {}))
-        places[2][place] = (at, law)
-    for (begin, end), (output, taken, places_of_field) in fields.items():
-        laws = {law for _, law in places_of_field.values()}
-        in_order = all(at == place for place, (at, _) in places_of_field.items())
-        if output.shape != taken.shape or len(places_of_field) != taken.size or not in_order or len(laws) != 1:
-            raise InputError(
-                f"the connection {begin} -> {end} is not of the whole field, element by element in the same way; "
-                "arrays can only be connected as a whole"
-            )
-        yield Connection(begin, end, laws.pop())
+        ends = End(source.unit, output.name), End(target.unit, taken.name)
+        ports |= {ends[0]: output, ends[1]: taken}
+        fields.setdefault(ends, []).append(_Scalar(start.name, at, pin.name, place, law))
+    for (begin, end), scalars in fields.items():
+        laws = {scalar.law for scalar in scalars}
+        in_order = all(scalar.at == scalar.place for scalar in scalars)
+        if ports[begin].shape == ports[end].shape and len(scalars) == ports[end].size and in_order and len(laws) == 1:
+            yield Connection(begin, end, laws.pop())
+            continue
+        for scalar in scalars:
+            yield Connection(End(begin.unit, scalar.output), End(end.unit, scalar.input), scalar.law)
+
+
+@dataclass(frozen=True)
+class _Scalar:
+    """One connection: of the output's and the input's element, by their names and places in their fields."""
+
+    output: str
+    at: int
+    input: str
+    place: int
+    law: Law | None

@@ -87,9 +87,11 @@ def _content(root: Any, folder: Path, tell: Callable[[str], None]) -> dict[str, 
     return content | _times(root, parts) | own_content
 
 
-def _written(connection: Connection) -> str:
-    """A connection as scenarios have it."""
-    return str(connection)
+def _written(connection: Connection) -> str | dict[str, Any]:
+    """A connection as scenarios have it; as an entry, where the names in it could not be told apart in a text."""
+    text = str(connection)
+    # A text begins with the name of a unit.
+    return connection.entry() if text.startswith("{") else text
 
 
 def _times(root: Any, parts: Sequence[SystemComponent]) -> dict[str, Any]:

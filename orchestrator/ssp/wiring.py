@@ -149,7 +149,7 @@ def _check(part: SystemComponent, name: str, kind: str) -> None:
     if variable is None or variable.causality != kind:
         raise InputError(f"{label} is of the kind {kind}, but the FMU {part.source} has no {kind} of that name")
     if kind != "parameter" and name not in part.scalars:
-        raise InputError(f"{label} is of the type {variable.type}; only Real is exchanged")
+        raise InputError(f"{label} is of the type {variable.type}, which is not exchanged")
     real, declared = part.connectors[name].find("ssc:Real", NAMESPACES), part.measure(name)
     shown = None if real is None else real.get("unit")
     if shown is not None and declared is not None and shown != declared.name:

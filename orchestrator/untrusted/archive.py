@@ -78,6 +78,11 @@ class Archive:
     def __contains__(self, name: str) -> bool:
         return name in self._members
 
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of all files in it."""
+        return frozenset(name for name, member in self._members.items() if not member.is_dir())
+
     def read(self, name: str, limit: int = LARGEST_MEMBER) -> bytes:
         """The content of the member `name`; InputError if there is none, or one of more than `limit` bytes."""
         member = self._members.get(name)

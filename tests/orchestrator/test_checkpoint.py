@@ -13,8 +13,9 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from cardiac_cosim.orchestrator.checkpoint import Checkpoint, read_checkpoint
 from cardiac_cosim.orchestrator.errors import InputError
+from cardiac_cosim.orchestrator.results.checkpoint import Checkpoint, read_checkpoint
+from cardiac_cosim.orchestrator.results.origin import Origin
 from cardiac_cosim.orchestrator.results.parts import Parts
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
@@ -130,27 +131,28 @@ def test_resuming_what_is_complete_changes_nothing_and_what_is_not_there_begins(
 
 
 def test_a_checkpoint_of_another_scenario_or_a_damaged_one_is_refused(small_scenario: Path, tmp_path: Path) -> None:
-    scenario = load_scenario(small_scenario)
-    Checkpoint(tmp_path, scenario, 1, {"part": lambda: {"a/b": {"c.d": np.arange(3.0)}, "n": 4}}).write()
-    memory = read_checkpoint(tmp_path, scenario)
+    origin = Origin.of(load_scenario(small_scenario), tmp_path)
+    Checkpoint(tmp_path, origin, {"part": lambda: {"a/b": {"c.d": np.arange(3.0)}, ".": {}, "n": 4}}).write()
+    memory = read_checkpoint(tmp_path, origin)
     assert memory is not None
     assert memory["part"]["a/b"]["c.d"].tolist() == [0.0, 1.0, 2.0]
+    assert memory["part"]["."] == {}
     assert int(memory["part"]["n"]) == 4
     other = load_scenario(small_scenario, ["coupling.step_ms=5", "units.fibers.parameters.endocardial_angle_deg=50"])
     with pytest.raises(
         InputError, match=r"coupling\.step_ms, units\.fibers\.parameters\.endocardial_angle_deg changed"
     ):
-        read_checkpoint(tmp_path, other)
+        read_checkpoint(tmp_path, Origin.of(other, tmp_path))
     (tmp_path / "checkpoint.h5").write_bytes(b"nonsense")
     with pytest.raises(InputError, match="run without --resume"):
-        read_checkpoint(tmp_path, scenario)
-    assert read_checkpoint(tmp_path / "nowhere", scenario) is None
+        read_checkpoint(tmp_path, origin)
+    assert read_checkpoint(tmp_path / "nowhere", origin) is None
 
 
 def test_a_run_from_the_beginning_leaves_nothing_of_an_earlier_checkpoint(small_scenario: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    Checkpoint(out, load_scenario(small_scenario), 1, {}).write()
+    Checkpoint(out, Origin.of(load_scenario(small_scenario), tmp_path), {}).write()
     Parts(out / "fields.parts").add(77.0, {"x": np.zeros(3)})
     assert _run(small_scenario, out)["status"] == "done"
     assert sorted(path.name for path in out.iterdir()) == [
@@ -170,7 +172,8 @@ def test_a_frame_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
         parts.add(2.0, {"x": np.arange(3.0), "y": object()})  # type: ignore[dict-item]
     again = Parts(tmp_path / "parts", kept=1)
     assert again.times == [1.0]
-    assert again.read(0, "x").tolist() == [0.0, 1.0, 2.0]
+    with again.open(0) as frame:
+        assert frame["x"][:].tolist() == [0.0, 1.0, 2.0]
 
 
 @pytest.mark.long

@@ -18,6 +18,7 @@ from cardiac_cosim.orchestrator.participants.native import Mesh
 from cardiac_cosim.orchestrator.probes import Probes
 from cardiac_cosim.orchestrator.results.coupling_log import CouplingLog
 from cardiac_cosim.orchestrator.results.fields import Fields
+from cardiac_cosim.orchestrator.results.origin import Origin
 from cardiac_cosim.orchestrator.results.summary import crossing_time, write_summary
 from cardiac_cosim.orchestrator.results.table import Table
 from cardiac_cosim.orchestrator.results.time_series import TimeSeries
@@ -319,7 +320,9 @@ def test_outputs_named_like_keys_of_the_summary_do_not_replace_them(
     seconds = {"total": 2.0, "master": 1.0, "units": {}}
     series.rows.append([0.0, 1.0, 2.0, 3.0, 0.0])
     series.close()
-    summary = write_summary(tmp_path / "s.json", _scenario(small_heart_file), series, seconds, {"status": "done"})
+    scenario = _scenario(small_heart_file)
+    origin = Origin.of(scenario, tmp_path)
+    summary = write_summary(tmp_path / "s.json", scenario, origin, series, seconds, {"status": "done"})
     assert (summary["status"], summary["end_ms"], summary["wall_s"]) == ("done", 0.0, seconds)
     # Nothing is ejected from a cavity without volume.
     assert summary["ejection_fraction"] == {}

@@ -1,6 +1,8 @@
 """If these fail, adaptive steps drift off the output times, refused steps leave traces, or units skip their turns."""
 
 from collections.abc import Mapping
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -47,10 +49,28 @@ def test_output_times_are_hit_to_the_last_digit(every: float, shortest: float) -
     time = Timeline.of_shortest_step(shortest, 1000 * every, every)
     assert time.tick_ms <= shortest / 8 * (1 + 1e-12)
     for output in (1, 7, 999, 1000):
-        assert time.time_ms(output * time.every) == output * every
+        assert time.time_ms(output * time.every) == float(output * Fraction(repr(every)))
         assert time.is_output(output * time.every)
     assert time.stop == 1000 * time.every
     assert not time.is_output(time.every + 1)
+
+
+@pytest.mark.parametrize("step", ["0.1", "0.3", "0.7", "1e-3", "2.5"])
+def test_times_are_the_decimals_a_person_would_write(step: str) -> None:
+    fixed = Timeline.of_fixed_step(float(step), 5000 * float(step), 10 * float(step))
+    shortest = Timeline.of_shortest_step(float(step), 5000 * float(step), 10 * float(step))
+    for tick in range(5001):
+        written = float(Decimal(step) * tick)
+        assert fixed.time_ms(tick) == written
+        if tick % 10 == 0:
+            assert shortest.time_ms(tick // 10 * shortest.every) == written
+    assert fixed.size_ms(1) == float(step)
+
+
+def test_a_step_that_is_no_decimal_ends_at_the_outputs_and_the_end_as_written() -> None:
+    thirds = Timeline.of_fixed_step(1.0 / 3.0, 7.0, 2.0)
+    assert [thirds.time_ms(tick) for tick in (6, 12, 21)] == [2.0, 4.0, 7.0]
+    assert thirds.time_ms(1) == thirds.size_ms(1) == 1.0 / 3.0
 
 
 # --- refused steps ------------------------------------------------------------------------------------------------

@@ -788,15 +788,17 @@ def test_parameter_values_are_converted(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("pairs", "whole"),
+    ("pairs", "connections"),
     [
-        ([(1, 1), (2, 2), (3, 3)], True),
-        ([(3, 3), (1, 1), (2, 2)], True),
-        ([(1, 1), (2, 2)], False),
-        ([(1, 2), (2, 1), (3, 3)], False),
+        ([(1, 1), (2, 2), (3, 3)], ["a.y -> b.u"]),
+        ([(3, 3), (1, 1), (2, 2)], ["a.y -> b.u"]),
+        ([(1, 1), (2, 2)], ["a.y[1] -> b.u[1]", "a.y[2] -> b.u[2]"]),
+        ([(1, 2), (2, 1), (3, 3)], ["a.y[1] -> b.u[2]", "a.y[2] -> b.u[1]", "a.y[3] -> b.u[3]"]),
     ],
 )
-def test_fields_are_connected_as_a_whole(pairs: list[tuple[int, int]], whole: bool, tmp_path: Path) -> None:
+def test_fields_are_connected_as_a_whole_or_by_their_elements(
+    pairs: list[tuple[int, int]], connections: list[str], tmp_path: Path
+) -> None:
     package = _paper(
         tmp_path / "fields.ssp",
         "".join(_scalar(f"y[{k}]", k, "output") for k in (1, 2, 3)),
@@ -807,12 +809,22 @@ def test_fields_are_connected_as_a_whole(pairs: list[tuple[int, int]], whole: bo
             "".join(f'<ssd:Connector name="u[{k}]" kind="input"/>' for k in (1, 2, 3)),
         ),
     )
-    if whole:
-        with open_package(package) as (scenario, _):
-            assert scenario.connections == ["a.y -> b.u"]
-    else:
-        with pytest.raises(InputError, match=r"a\.y -> b\.u is not of the whole field"), open_package(package):
-            pass
+    with open_package(package) as (scenario, _):
+        assert scenario.connections == connections
+
+
+def test_names_with_blanks_and_arrows_are_connected_as_they_are(tmp_path: Path) -> None:
+    package = _paper(
+        tmp_path / "names.ssp",
+        _scalar("y out * 2 -&gt; z", 0, "output"),
+        _scalar("u in", 1, "input", 'start="0"'),
+        _connect("y out * 2 -&gt; z", "u in"),
+        ('<ssd:Connector name="y out * 2 -&gt; z" kind="output"/>', '<ssd:Connector name="u in" kind="input"/>'),
+    )
+    with open_package(package) as (scenario, _):
+        (connection,) = scenario.resolved()["connections"]
+    wanted = {"from": "a", "output": "y out * 2 -> z", "to": "b", "input": "u in"}
+    assert {key: value for key, value in connection.items() if value is not None} == wanted
 
 
 def test_an_annotation_that_is_not_ours_any_more_is_refused(cosim: Cosim, tmp_path: Path) -> None:

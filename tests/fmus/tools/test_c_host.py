@@ -12,7 +12,8 @@ import fmpy
 import numpy as np
 import pytest
 from cardiac_cosim.fmus.build import build_fmu
-from cardiac_cosim.orchestrator.run import checked_mesh, run_scenario
+from cardiac_cosim.orchestrator.assembly import checked_mesh
+from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 from cardiac_cosim.units.registry import UNITS
 

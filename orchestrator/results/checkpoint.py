@@ -1,0 +1,114 @@
+"""checkpoint.h5: all that a run needs to go on after its process has ended, in whatever way.
+
+The content is nested dictionaries of arrays and numbers, as groups and data sets. The file is written aside and put in
+place at once, so that there always is a whole one. What it costs does not grow with the run: of the other files it
+keeps how long they were, and a hash.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+import h5py
+import numpy as np
+
+from ..errors import InputError
+from .hdf5 import reading_sealed, write_sealed
+from .names import CHECKPOINT
+from .origin import Origin
+
+_FORMAT = 2
+_REMEDY = "run without --resume to begin anew"
+
+#: What a run goes on from: by part, what that kept.
+Memories = Mapping[str, Any]
+
+
+class Checkpoint:
+    """Writes the memories of all `parts` when asked to.
+
+    Parameters
+    ----------
+    parts:
+        By name, what gives its memory away: the master and everything that writes results.
+    """
+
+    def __init__(self, folder: Path, origin: Origin, parts: Mapping[str, Callable[[], Mapping[str, Any]]]) -> None:
+        self._path = folder / CHECKPOINT
+        self._origin = origin
+        self._parts = parts
+
+    def write(self) -> None:
+        """Write a checkpoint of this moment, between two steps."""
+        memories = {name: memory() for name, memory in self._parts.items()}
+
+        def fill(file: h5py.File) -> None:
+            file.attrs["format"] = _FORMAT
+            file["origin"] = json.dumps(self._origin.content())
+            _store(file.create_group("memories"), memories)
+
+        write_sealed(self._path, fill)
+
+    @property
+    def exists(self) -> bool:
+        """Whether there is one to go on from."""
+        try:
+            return self._path.is_file()
+        # In a folder to which we have lost the rights there is nothing to go on from either.
+        except OSError:
+            return False
+
+    def remove(self) -> None:
+        """Nothing is to be gone on from."""
+        self._path.unlink(missing_ok=True)
+
+
+def read_checkpoint(folder: Path, origin: Origin) -> Memories | None:
+    """The memories of the checkpoint in `folder` by part; None if there is no checkpoint.
+
+    InputError if it is of another origin, or not readable.
+    """
+    path = folder / CHECKPOINT
+    try:
+        with reading_sealed(path) as file:
+            if int(file.attrs["format"]) != _FORMAT:
+                raise ValueError("it was written by another version of this program")
+            before = Origin.from_content(json.loads(file["origin"][()]))
+            memories = _load(file["memories"])
+    except FileNotFoundError:
+        return None
+    # What h5py raises of a file that lacks something, and what an operating system does not read.
+    except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise InputError(f"{path}: no checkpoint to go on from ({why}); {_REMEDY}") from None
+    changed = origin.changed_keys(before)
+    if changed:
+        raise InputError(
+            f"{path}: the checkpoint is of another scenario; {', '.join(changed)} changed since. "
+            "Undo that, or run without --resume"
+        )
+    for change in origin.changes(before):
+        raise InputError(f"{path}: {change}, or {_REMEDY}")
+    return memories
+
+
+def _store(group: h5py.Group, memory: Mapping[str, Any]) -> None:
+    for name, value in memory.items():
+        if isinstance(value, Mapping):
+            _store(group.create_group(_quoted(name)), value)
+        else:
+            group[_quoted(name)] = value
+
+
+def _quoted(name: str) -> str:
+    """Names of foreign variables may have slashes, which would be groups, or be a point, which would be this group."""
+    return quote(name, safe="").replace(".", "%2E")
+
+
+def _load(group: h5py.Group) -> dict[str, Any]:
+    return {
+        unquote(name): _load(item) if isinstance(item, h5py.Group) else np.asarray(item[()])
+        for name, item in group.items()
+    }

@@ -1,0 +1,108 @@
+"""HDF5 files that are never half written, and never damaged without our knowing it.
+
+A file that HDF5 cannot write, because the disk is full, it cannot close either, and then it takes the process down at
+its end. So HDF5 writes to memory, or to a file object that never fails in its presence; what the operating system
+refuses is raised after HDF5 has closed the file.
+"""
+
+import errno
+import hashlib
+import io
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+
+from .whole import replacing, write_whole
+
+_DIGEST = hashlib.sha256
+_SIZE = _DIGEST().digest_size
+
+
+class DamagedFile(OSError):
+    """A file is not what was written."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(errno.EBADMSG, "it is damaged", str(path))
+
+
+def write_sealed(path: Path, fill: Callable[[h5py.File], None]) -> None:
+    """Put a file that `fill` writes in place, with a hash of its content at the end, which HDF5 does not see."""
+    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+        fill(file)
+        file.flush()
+        content = file.id.get_file_image()
+    write_whole(path, content + _DIGEST(content).digest())
+
+
+@contextmanager
+def reading_sealed(path: Path) -> Iterator[h5py.File]:
+    """The file that `write_sealed` wrote, open; DamagedFile if it is not what was written, OSError if it is not there.
+
+    No damaged content ever reaches HDF5, which would not survive all of it.
+    """
+    whole = path.read_bytes()
+    content, digest = whole[:-_SIZE], whole[-_SIZE:]
+    if _DIGEST(content).digest() != digest:
+        raise DamagedFile(path)
+    with h5py.File(io.BytesIO(content), "r") as file:
+        yield file
+
+
+def write_streamed(path: Path, fill: Callable[[h5py.File], None]) -> None:
+    """Put a file that `fill` writes in place, without ever having all of it in memory."""
+    with replacing(path) as part, part.open("w+b", buffering=0) as raw:
+        sink = _Sink(raw)
+        try:
+            with h5py.File(sink, "w") as file:
+                fill(file)
+        finally:
+            # What HDF5 made of a file that lost what was written to it does not matter.
+            if sink.refusal is not None:
+                raise OSError(sink.refusal.errno, sink.refusal.strerror, str(path))
+
+
+class _Sink:
+    """A file for HDF5; once the operating system has refused to write (`refusal`), nothing is written any more."""
+
+    def __init__(self, raw: io.FileIO) -> None:
+        self._raw = raw
+        self.refusal: OSError | None = None
+
+    def write(self, data: memoryview) -> int:
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        try:
+            while self.refusal is None and len(rest):
+                rest = rest[self._raw.write(rest) :]
+        except OSError as error:
+            self.refusal = error
+        return size
+
+    def truncate(self, size: int) -> int:
+        try:
+            if self.refusal is None:
+                os.ftruncate(self._raw.fileno(), size)
+        except OSError as error:
+            self.refusal = error
+        return size
+
+    def read(self, size: int = -1) -> bytes:
+        """By this HDF5's binding tells a file from a path."""
+        return self._raw.read(size) or b""
+
+    def readinto(self, buffer: memoryview) -> int:
+        found = self._raw.readinto(buffer) or 0
+        memoryview(buffer).cast("B")[found:] = bytes(len(buffer) - found)
+        return len(buffer)
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        return self._raw.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._raw.tell()
+
+    def flush(self) -> None:
+        """Nothing is held back."""

@@ -1,0 +1,19 @@
+"""The files of a results folder by their names, on which other people's scripts rely."""
+
+TIME_SERIES = "timeseries.csv"
+COUPLING = "coupling.csv"
+ITERATIONS = "iterations.csv"
+PROFILE = "profile.json"
+FIELDS = "fields.h5"
+XDMF = "fields.xdmf"
+SUMMARY = "summary.json"
+#: Only where an FMU logs something.
+FMU_LOG = "fmu.log"
+
+#: Only while a run goes on, or to go on from.
+PARTS = "fields.parts"
+CHECKPOINT = "checkpoint.h5"
+
+#: Those that grow by additions; the others are put in place whole.
+GROWING = (TIME_SERIES, COUPLING, ITERATIONS, PROFILE)
+WHOLE = (FIELDS, XDMF, SUMMARY, CHECKPOINT)

@@ -1,0 +1,133 @@
+"""What the numbers of a run come from: its scenario, the files it names, this program, and what that computes with."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from platform import python_version
+from typing import Any
+
+from ..scenario import Scenario
+
+#: Whose versions the bits of a run may depend on.
+_PACKAGES = (
+    "cardiac-cosim",
+    "fmpy",
+    "gmsh",
+    "h5py",
+    "meshio",
+    "networkx",
+    "numpy",
+    "pythonfmu",
+    "pythonfmu3",
+    "scikit-fem",
+    "scipy",
+)
+
+#: The floors of this program, and what of them is read or run.
+_FLOORS = ("units", "fmus", "orchestrator")
+_KINDS = {".py", ".so", ".msh"}
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Two runs of the same origin give the same bits.
+
+    `scenario` is the resolved one; `files` are hashes by the name that the scenario has for a file, None where there
+    is none; `program` is a hash of this program's code and kernels.
+    """
+
+    scenario: Mapping[str, Any]
+    files: Mapping[str, str | None]
+    program: str
+    versions: Mapping[str, str]
+
+    @classmethod
+    def of(cls, scenario: Scenario, base: Path) -> "Origin":
+        """The origin of a run of `scenario`, whose paths are relative to `base`, here and now."""
+        # As it comes back from a file.
+        resolved = json.loads(json.dumps(scenario.resolved()))
+        files = {name: _hash(base / name) for name in scenario.files()}
+        versions = {"python": python_version(), **{name: version(name) for name in _PACKAGES}}
+        return cls(resolved, files, _program(), versions)
+
+    @classmethod
+    def from_content(cls, content: Any) -> "Origin":
+        """The origin that `content` was made of; ValueError if it was made of none."""
+        try:
+            prints = content["fingerprints"]
+            parts = (content["scenario"], prints["files"], content["versions"])
+            if not all(isinstance(part, dict) for part in parts):
+                raise ValueError("no fingerprints")
+            return cls(parts[0], parts[1], str(prints["program"]), parts[2])
+        except (KeyError, TypeError):
+            raise ValueError("no fingerprints") from None
+
+    def content(self) -> dict[str, Any]:
+        """For a file."""
+        prints = {"files": dict(self.files), "program": self.program}
+        return {"versions": dict(self.versions), "fingerprints": prints, "scenario": dict(self.scenario)}
+
+    def changed_keys(self, earlier: "Origin") -> list[str]:
+        """The keys of the scenario that were others."""
+        return _differences(earlier.scenario, self.scenario)
+
+    def changes(self, earlier: "Origin") -> list[str]:
+        """What of the rest was another, in words, each with what undoes it."""
+        found = []
+        for name in sorted({*earlier.files, *self.files}):
+            if earlier.files.get(name) != self.files.get(name):
+                gone = self.files.get(name) is None
+                found.append(f"{name} {'is gone' if gone else 'has changed since'}; restore it")
+        for name in sorted({*earlier.versions, *self.versions}):
+            before, now = earlier.versions.get(name), self.versions.get(name)
+            if before != now:
+                found.append(f"{name} was {before or 'not used'} and is {now or 'not used'}; install what it was")
+        if earlier.program != self.program and not found:
+            found.append("this program has changed since; take the version that began the run")
+        return found
+
+
+def _differences(one: Any, other: Any, key: str = "") -> list[str]:
+    """The keys at which two scenarios differ."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return [
+            difference
+            for name in sorted(one.keys() | other.keys())
+            for difference in _differences(one.get(name), other.get(name), f"{key}.{name}" if key else name)
+        ]
+    return [] if one == other else [key]
+
+
+def _hash(path: Path) -> str | None:
+    """Of a file's content, or of all of an FMU in a folder; None where nothing can be read."""
+    try:
+        if path.is_file():
+            with path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+        # A folder that no FMU lies in, or a device that has no end, is for nobody to read.
+        if not (path / "modelDescription.xml").is_file():
+            return None
+        members = sorted(member for member in path.rglob("*") if member.is_file())
+        return _hash_all({member.relative_to(path).as_posix(): member for member in members})
+    # A name that no file can have is a ValueError; whoever reads the file says what is wrong with it.
+    except (OSError, ValueError):
+        return None
+
+
+def _hash_all(files: Mapping[str, Path]) -> str:
+    digest = hashlib.sha256()
+    for name, path in files.items():
+        content = path.read_bytes()
+        digest.update(f"{name} {len(content)} ".encode() + content)
+    return digest.hexdigest()
+
+
+@cache
+def _program() -> str:
+    root = Path(__file__).parents[2]
+    files = sorted(path for floor in _FLOORS for path in (root / floor).rglob("*") if path.suffix in _KINDS)
+    return _hash_all({path.relative_to(root).as_posix(): path for path in files})

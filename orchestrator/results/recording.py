@@ -1,0 +1,205 @@
+"""A run on its way into its folder: all that is written of it, in the order in which a process may end anywhere."""
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, closing
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from ..assembly import Assembly
+from ..coupling.exchange import Exchange
+from ..coupling.master import Accepted
+from ..errors import InputError, Interrupted, RunError
+from ..wall_clock import WallClock
+from .appended import check
+from .checkpoint import Checkpoint, Memories
+from .coupling_log import CouplingLog
+from .fields import Fields
+from .iteration_log import IterationLog
+from .names import COUPLING, FMU_LOG, ITERATIONS, PARTS, SUMMARY, TIME_SERIES
+from .origin import Origin
+from .parts import check_parts
+from .profile import Profile
+from .recorder import Recorder
+from .summary import write_summary
+from .time_series import TimeSeries
+
+#: How a run ended, by the exception that ended it; any other is a crash.
+_STATUS: dict[type[BaseException], str] = {
+    RunError: "failed",
+    InputError: "failed",
+    Interrupted: "interrupted",
+    KeyboardInterrupt: "interrupted",
+}
+
+
+class Recording:
+    """Writes the results of one run while it is entered; on leaving, the summary says how the run ended.
+
+    As long as the summary does not call it done, the checkpoint and what belongs to it stay. A file that cannot be
+    completed keeps neither the others nor the summary from it, and hides no error of the run. Refusals of the
+    operating system are RunErrors.
+
+    Parameters
+    ----------
+    before:
+        What an earlier process left in the same folder to go on from.
+    wall:
+        Makes the clock, from what an earlier process kept of it.
+
+    Attributes
+    ----------
+    summary:
+        The content of the summary, once the recording is over.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        origin: Origin,
+        assembly: Assembly,
+        before: Memories | None,
+        wall: Callable[[Mapping[str, Any] | None], WallClock],
+    ) -> None:
+        self.summary: dict[str, Any] = {}
+        self._folder, self._origin, self._assembly = folder, origin, assembly
+        kept = before or {}
+        scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
+        self._fields: Fields | None = None
+        self._iterations: IterationLog | None = None
+        # The fields first: a value that is not finite ends the step before the time series has a row of it.
+        recorders: dict[str, Recorder] = {}
+        with ExitStack() as opened:
+
+            def add(name: str, recorder: Any) -> Any:
+                recorders[name] = opened.enter_context(closing(recorder))
+                return recorder
+
+            if assembly.mesh is not None:
+                self._fields = add("fields", Fields(folder, participants, assembly.mesh, kept.get("fields")))
+            series = TimeSeries(folder, participants, assembly.probes, kept.get("series"))
+            self._series: TimeSeries = add("series", series)
+            self._log: CouplingLog = add("log", CouplingLog(folder, master.units, assembly.converged, kept.get("log")))
+            if assembly.converged:
+                self._iterations = add("iterations", IterationLog(folder, assembly.converged, kept.get("iterations")))
+            self._profile = opened.enter_context(closing(Profile(folder, list(participants))))
+            self._wall = wall(kept.get("wall"))
+            opened.pop_all()
+        for participant in participants.values():
+            participant.log_to((folder / FMU_LOG).absolute())
+        self._recorders = recorders
+        memories = {"master": master.memory, "wall": self._wall.memory}
+        memories |= {name: recorder.memory for name, recorder in recorders.items()}
+        self._checkpoint = Checkpoint(folder, origin, memories)
+        self._every = scenario.run.checkpoint_every
+        self._keeps = self._every > 0 and all(participants[unit].abilities.serializes for unit in master.units)
+
+    @staticmethod
+    def check(folder: Path, before: Memories) -> None:
+        """Whether all is there that `before` goes on from; DamagedFile if not. Nothing is touched."""
+        check(folder / TIME_SERIES, before["series"])
+        check(folder / COUPLING, before["log"]["table"])
+        if "iterations" in before:
+            check(folder / ITERATIONS, before["iterations"])
+        if "fields" in before:
+            check_parts(folder / PARTS, int(before["fields"]["frames"]))
+
+    def accept(self, step: Accepted, exchange: Exchange) -> None:
+        """See Observer."""
+        try:
+            for recorder in self._recorders.values():
+                recorder.accept(step, exchange)
+            self._profile.accept(step, exchange)
+            if self._keeps and step.number and step.number % self._every == 0:
+                self._checkpoint.write()
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def keep(self) -> None:
+        """Write a checkpoint of this moment, between two steps, where the units can be kept."""
+        try:
+            if self._keeps:
+                self._checkpoint.write()
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def __enter__(self) -> "Recording":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        problems = self._close(error)
+        whole = not problems
+        ending = self._ending(error, problems)
+        done = ending is None
+        resumable = self._checkpoint.exists and not done
+        outcome = _outcome(ending) | {"unconverged_ms": self._log.unconverged, "resumable": resumable}
+        scenario, seconds = self._assembly.scenario, self._wall.seconds()
+        path = self._folder / SUMMARY
+        try:
+            self.summary = write_summary(path, scenario, self._origin, self._series, seconds, outcome)
+            if not resumable:
+                self._checkpoint.remove()
+                # Files that could not be completed may still refer to the frames.
+                if self._fields is not None and whole:
+                    self._fields.forget()
+        except Exception as problem:
+            ending = self._ending(ending, [problem])
+        if ending is not error and ending is not None:
+            raise ending from error
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _close(self, error: BaseException | None) -> list[Exception]:
+        """Complete all files; what could not be."""
+        problems: list[Exception] = []
+        calls: list[Callable[[], None]] = [*(recorder.close for recorder in self._recorders.values())]
+        calls.append(self._profile.close)
+        if isinstance(error, RunError) and error.sweeps is not None and error.time_ms is not None:
+            time_ms, sweeps, iterations = error.time_ms, error.sweeps, self._iterations
+            if iterations is not None:
+                calls.insert(0, lambda: iterations.failed(time_ms, sweeps))
+        for call in calls:
+            try:
+                call()
+            except Exception as problem:
+                problems.append(problem)
+        return problems
+
+    def _ending(self, error: BaseException | None, problems: list[Exception]) -> BaseException | None:
+        """What a run ends with that ended with `error` and whose files then had these problems."""
+        if not problems:
+            return error
+        bugs = [problem for problem in problems if not isinstance(problem, OSError)]
+        if isinstance(error, RunError):
+            return RunError(f"{error}; besides, {'; '.join(_told(problem) for problem in problems)}")
+        if error is None or isinstance(error, Interrupted):
+            return bugs[0] if bugs else self._refused(problems[0])
+        for problem in problems:
+            error.add_note(f"besides, {_told(problem)}")
+        return error
+
+    def _refused(self, error: Exception) -> RunError:
+        rows = self._series.rows
+        reached = f" The results up to {rows[-1][0]:g} ms are complete;" if rows else ""
+        return RunError(
+            f"the results cannot be written: {_told(error)}.{reached} make room, or give back what was taken away, and "
+            "go on with --resume"
+        )
+
+
+def _outcome(error: BaseException | None) -> dict[str, Any]:
+    """Status and message of a run that ended with `error`."""
+    if error is None:
+        return {"status": "done"}
+    status = next((status for kind, status in _STATUS.items() if isinstance(error, kind)), None)
+    if status is None:
+        return {"status": "crashed", "message": f"{type(error).__name__}: {error}"}
+    return {"status": status} if status == "interrupted" else {"status": status, "message": str(error)}
+
+
+def _told(problem: Exception) -> str:
+    if isinstance(problem, OSError) and problem.strerror:
+        return f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
+    return f"{type(problem).__name__}: {problem}"
