@@ -10,9 +10,11 @@ from .coupling.connections import Connection, connect
 from .coupling.master import Master
 from .errors import InputError, ParticipantError, RunError
 from .fmu_folder import FmuFolder
+from .participants.driven import drive
 from .participants.native import Mesh, check_mesh, check_unit, scene_mesh
 from .participants.participant import Participant
 from .participants.recipe import Recipe
+from .participants.recorded import recorded
 from .probes import Probes
 from .scenario import Scenario, UnitEntry
 from .scene_warnings import scene_warnings
@@ -36,16 +38,26 @@ class Assembly:
 
 
 def assemble(
-    stack: ExitStack, scenario: Scenario, base: Path, mesh: Mesh | None, fmu_dir: Path | None = None
+    stack: ExitStack,
+    scenario: Scenario,
+    base: Path,
+    mesh: Mesh | None,
+    fmu_dir: Path | None = None,
+    described: bool = False,
 ) -> Assembly:
     """Put `scenario` together, whose paths are relative to `base` and whose mesh is `mesh` (`checked_mesh`).
 
-    The participants are closed with the `stack`. FMUs are built in `fmu_dir`, or in the user's cache. InputError for
-    whatever does not fit.
+    What is only `described` runs no code of foreign FMUs, and cannot be initialised. The participants are closed with
+    the `stack`. FMUs are built in `fmu_dir`, or in the user's cache. InputError for whatever does not fit.
     """
     probes = None if mesh is None else Probes(mesh, scenario.output.probes_mm)
-    participants = make_participants(stack, scenario, base, mesh, fmu_dir)
+    participants = make_participants(stack, scenario, base, mesh, fmu_dir, described)
     connections = connect(participants, scenario.connections, scenario.connect_by_name)
+    if scenario.inputs is not None:
+        connected = [(link.target.unit, link.target.name) for link in connections]
+        ramps = scenario.coupling.interpolation == "linear"
+        participants = drive(participants, connected, base / scenario.inputs.file, ramps)
+    recorded(participants)
     scheme, converged = build_scheme(scenario.coupling, participants, connections)
     master = build_master(scenario, participants, connections, scheme)
     return Assembly(
@@ -75,11 +87,16 @@ def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
 
 
 def make_participants(
-    stack: ExitStack, scenario: Scenario, base: Path, mesh: Mesh | None, fmu_dir: Path | None = None
+    stack: ExitStack,
+    scenario: Scenario,
+    base: Path,
+    mesh: Mesh | None,
+    fmu_dir: Path | None = None,
+    described: bool = False,
 ) -> dict[str, Participant]:
-    """All participants, in this process or in workers, closed with the `stack`."""
+    """All participants, in this process or in workers, closed with the `stack`; or `described` only."""
     fmus = FmuFolder(stack, fmu_dir)
-    make: Callable[[Recipe], Participant] = Recipe.make
+    make: Callable[[Recipe], Participant] = Recipe.describe if described else Recipe.make
     if scenario.run.workers is not None:
         # Imported here: who works alone need not wait for it.
         from .participants.workers import Workers
@@ -103,14 +120,15 @@ def make_participants(
 
 def _recipe(name: str, entry: UnitEntry, scenario: Scenario, base: Path, mesh: Mesh | None, fmus: FmuFolder) -> Recipe:
     parameters, ramps = dict(entry.parameters), scenario.coupling.interpolation == "linear"
+    observe = scenario.observed(name)
     if entry.fmu is not None:
-        return Recipe(name, parameters, ramps, fmu=base / entry.fmu, start=dict(entry.start))
+        return Recipe(name, parameters, ramps, fmu=base / entry.fmu, start=dict(entry.start), observe=observe)
     if mesh is None or entry.unit is None:
         raise TypeError("a scenario without a scene has FMUs only")
     if scenario.run.participants == "native":
-        return Recipe(name, parameters, ramps, unit=entry.unit, mesh=mesh)
+        return Recipe(name, parameters, ramps, unit=entry.unit, mesh=mesh, observe=observe)
     fmi = 3 if scenario.run.participants == "fmu3" else 2
-    return Recipe(name, parameters, ramps, fmu=fmus.fmu(entry.unit, mesh, fmi))
+    return Recipe(name, parameters, ramps, fmu=fmus.fmu(entry.unit, mesh, fmi), observe=observe)
 
 
 @contextmanager

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .coupling.schemes import Sweeps
 
+from .quoting import shortened
+
 
 class InputError(Exception):
     """What the person gave is wrong (exit code 2). The message names the file, the key and the remedy."""
@@ -49,7 +51,9 @@ class ParticipantLost(ParticipantError):
 
 
 class ParticipantTerminated(ParticipantError):
-    """A participant asks for the end of the simulation."""
+    """A participant asks for the end of the simulation; `time_s` is the last time it reached, where it says so."""
+
+    time_s: float | None = None
 
 
 class NotConverged(Exception):
@@ -63,8 +67,18 @@ class NotConverged(Exception):
         self.sweeps = sweeps
 
 
+#: Characters of a name, and known names, that a hint repeats.
+_LONGEST, _MOST = 200, 30
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """`; did you mean 'x'?` with the nearest known name, or the list of all known ones."""
+    """`; did you mean 'x'?` with the nearest known name, or the list of the known ones."""
     names = sorted(known)
-    near = get_close_matches(name, names, n=1, cutoff=0.5)
-    return f"; did you mean '{near[0]}'?" if near else f" (known: {', '.join(names) or 'none'})"
+    # Comparing takes time that grows with the length.
+    near = get_close_matches(name, names, n=1, cutoff=0.5) if len(name) <= _LONGEST else []
+    if near:
+        return f"; did you mean '{shortened(near[0], _LONGEST)}'?"
+    listed = ", ".join(shortened(each, _LONGEST) for each in names[:_MOST])
+    if len(names) > _MOST:
+        listed += f", ... {len(names)} in all"
+    return f" (known: {listed or 'none'})"

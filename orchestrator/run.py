@@ -124,5 +124,5 @@ def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -
     """What `scenario` builds, exchanges and solves, in words; nothing is computed but the mesh."""
     mesh = checked_mesh(scenario, base)
     with ExitStack() as stack:
-        assembly = assemble(stack, called_directly(scenario), base, mesh, fmu_dir)
+        assembly = assemble(stack, called_directly(scenario), base, mesh, fmu_dir, described=True)
         return describe(assembly)

@@ -5,12 +5,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError
-from ruamel.yaml.reader import ReaderError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from .errors import InputError, did_you_mean
+from .quoting import quoted, shortened
+from .untrusted.yaml_text import LARGEST_TEXT, parse_yaml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # A kilometre in mm is far outside of any anatomy, and near enough to be computed with.
@@ -20,8 +28,17 @@ Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 #: How far a time may be from a whole number of steps and still be taken for rounding in the YAML file.
 _WHOLE = 1e-9
 
-#: Characters of a wrong value that a message repeats.
-_LONGEST = 80
+#: Bytes of a name: the system allows 255, of which endings such as `.fmu` and `.partial` take some.
+_LONGEST_NAME = 200
+
+#: Bytes of a path, and of each of its parts.
+_LONGEST_PATH, _LONGEST_PART = 4000, 255
+
+#: Problems of one file that are told, and characters of those of the command line that are repeated with each.
+_MOST_PROBLEMS, _LONGEST_ORIGIN = 20, 300
+
+#: Sections in sections that `--set` can name.
+_DEEPEST_KEY = 20
 
 #: More communication steps than any run can take are a slip of the pen.
 _MOST_STEPS = 10_000_000
@@ -38,21 +55,6 @@ _ALLOWED = {
     _PROBE_NAME: "use letters, digits and '_'",
 }
 
-#: The remedies for what people stumble over in YAML, by what the parser complains of.
-_YAML_REMEDIES = {
-    "'\\t'": "indent with spaces, not with tabs",
-    "duplicate key": "keep one of the two",
-    "mapping values are not allowed": "check the indentation, and that a space follows every colon",
-    "could not find expected ':'": "write `key: value`, and check the indentation",
-    "expected ',' or": "close the bracket or brace, and separate its items by commas",
-    "<block end>": "check the indentation",
-    "cannot start any token": "put the text in quotes",
-    "undefined alias": "put the text in quotes",
-    "another document": "a scenario is one document; remove the line ---",
-    "end of stream": "a quote is not closed",
-    "constructor for the tag": "put the text in quotes",
-}
-
 
 def _scalar(value: Any) -> Any:
     if not isinstance(value, (bool, int, float, str)):
@@ -63,7 +65,24 @@ def _scalar(value: Any) -> Any:
     return value
 
 
+def _name(name: str) -> str:
+    if (size := len(name.encode())) > _LONGEST_NAME:
+        raise ValueError(f"a name of {size} bytes; files are called after it, so more than {_LONGEST_NAME} are refused")
+    return name
+
+
+def _path(path: str) -> str:
+    size = len(path.encode())
+    if size > _LONGEST_PATH or any(len(part.encode()) > _LONGEST_PART for part in path.split("/")):
+        raise ValueError(f"a path of {size} bytes, which no file has; correct it")
+    return path
+
+
 Scalar = Annotated[Any, AfterValidator(_scalar)]
+FilePath = Annotated[str, AfterValidator(_path)]
+
+#: More of anything that is counted is a slip of the pen.
+_MOST = 1_000_000_000
 
 
 class _Section(BaseModel):
@@ -106,7 +125,7 @@ class Scene(_Section):
     """
 
     geometry: str | None = None
-    mesh: str | None = None
+    mesh: FilePath | None = None
     mesh_size_mm: Positive = 5.0
     boundaries: dict[str, Annotated[Any, AfterValidator(_groups)]] = Field(default_factory=dict)
     scale: Annotated[Any, AfterValidator(_scale)] = None
@@ -134,10 +153,10 @@ class UnitEntry(_Section):
     """
 
     unit: str | None = None
-    fmu: str | None = None
+    fmu: FilePath | None = None
     parameters: dict[str, Scalar] = Field(default_factory=dict)
     start: dict[str, Scalar] = Field(default_factory=dict)
-    every: Annotated[int, Field(ge=1)] = 1
+    every: Annotated[int, Field(ge=1, le=_MOST)] = 1
 
     @model_validator(mode="after")
     def _one_of(self) -> "UnitEntry":
@@ -146,6 +165,52 @@ class UnitEntry(_Section):
         if self.start and self.fmu is None:
             raise ValueError("`start` is for the variables of an FMU; a unit starts from its `parameters`")
         return self
+
+
+class ConnectionEntry(_Section):
+    """A connection in its parts: for names that cannot be told from what is around them, and for programs.
+
+    With `factor` or `offset` the input gets factor · value + offset, and units of measure are the writer's affair.
+    """
+
+    source: Annotated[str, Field(alias="from", min_length=1)]
+    output: Annotated[str, Field(min_length=1)]
+    target: Annotated[str, Field(alias="to", min_length=1)]
+    input: Annotated[str, Field(min_length=1)]
+    factor: Annotated[float | None, Field(allow_inf_nan=False)] = None
+    offset: Annotated[float | None, Field(allow_inf_nan=False)] = None
+
+    @property
+    def law(self) -> tuple[float, float] | None:
+        """Factor and offset; None where there are none."""
+        if self.factor is None and self.offset is None:
+            return None
+        return (1.0 if self.factor is None else self.factor), self.offset or 0.0
+
+
+#: How pydantic marks in which of its two forms a connection was read; no person has to see that.
+_AS_TEXT, _AS_ENTRY = "[text]", "[entry]"
+
+
+def _form(given: Any) -> str:
+    """A mapping with none of the keys is a text that was broken at its colon."""
+    is_entry = isinstance(given, ConnectionEntry) or (
+        isinstance(given, Mapping) and not {"from", "output", "to", "input"}.isdisjoint(given)
+    )
+    return _AS_ENTRY if is_entry else _AS_TEXT
+
+
+#: A connection as 'unit.output -> unit.input', or in its parts.
+Written = Annotated[
+    Annotated[str, Tag(_AS_TEXT)] | Annotated[ConnectionEntry, Tag(_AS_ENTRY)],
+    Discriminator(_form),
+]
+
+
+class Inputs(_Section):
+    """Signals that drive inputs: the columns of a CSV file."""
+
+    file: Annotated[str, Field(min_length=1)]
 
 
 class CriterionEntry(_Section):
@@ -165,7 +230,7 @@ class CriterionEntry(_Section):
 class Iterate(_Section):
     """Sweeps to convergence."""
 
-    max_iterations: Annotated[int, Field(ge=1)] = 20
+    max_iterations: Annotated[int, Field(ge=1, le=_MOST)] = 20
     acceleration: Literal["none", "relaxation", "aitken", "anderson"] = "none"
     relaxation: Annotated[float | None, Field(gt=0, le=2)] = None
     converge: Annotated[dict[str, CriterionEntry], Field(min_length=1)]
@@ -220,7 +285,7 @@ class Run(_Section):
     participants: Literal["fmu", "fmu3", "native"] = "fmu"
     workers: Annotated[str | None, Field(pattern=_WORKERS)] = None
     unit_time_limit_s: Positive | None = None
-    checkpoint_every: Annotated[int, Field(ge=0)] = 20
+    checkpoint_every: Annotated[int, Field(ge=0, le=_MOST)] = 20
 
     @model_validator(mode="after")
     def _limited(self) -> "Run":
@@ -230,23 +295,34 @@ class Run(_Section):
 
 
 class Output(_Section):
-    """What is kept, and how often."""
+    """What is kept, and how often.
+
+    `variables` are those that the time series has, `unit.variable`, where `*` and `?` stand for any characters; if none
+    are given, it has what the units' outputs ask for.
+    """
 
     every_ms: Positive = 5.0
-    probes_mm: dict[Annotated[str, Field(pattern=_PROBE_NAME)], Point] = Field(default_factory=dict)
+    variables: Annotated[list[str] | None, Field(min_length=1)] = None
+    probes_mm: dict[Annotated[str, Field(pattern=_PROBE_NAME), AfterValidator(_name)], Point] = Field(
+        default_factory=dict
+    )
 
 
 class Scenario(_Section):
     """A whole scenario.
 
     `connections` are those that are written; with `connect_by_name` every other input is fed by the output of its name.
+    `inputs` drive what is not connected.
     """
 
-    name: Annotated[str, Field(pattern=_NAME)]
+    name: Annotated[str, Field(pattern=_NAME), AfterValidator(_name)]
     scene: Scene | None = None
-    units: Annotated[dict[Annotated[str, Field(pattern=_UNIT_NAME)], UnitEntry], Field(min_length=1)]
-    connections: list[str] = Field(default_factory=list)
+    units: Annotated[
+        dict[Annotated[str, Field(pattern=_UNIT_NAME), AfterValidator(_name)], UnitEntry], Field(min_length=1)
+    ]
+    connections: list[Written] = Field(default_factory=list)
     connect_by_name: bool = True
+    inputs: Inputs | None = None
     coupling: Coupling = Coupling()
     run: Run = Run()
     output: Output = Output()
@@ -258,6 +334,19 @@ class Scenario(_Section):
             raise ValueError(f"the key 'scene' is missing; unit '{own[0]}' needs a mesh")
         if self.scene is None and self.output.probes_mm:
             raise ValueError("`output.probes_mm` needs a `scene`, whose mesh the points lie in; remove it")
+        return self
+
+    @model_validator(mode="after")
+    def _observed(self) -> "Scenario":
+        for text in self.output.variables or ():
+            unit, _, variable = text.partition(".")
+            if unit not in self.units:
+                raise ValueError(
+                    f"`output.variables`: {quoted(text)} is of no unit{did_you_mean(unit, self.units)}; "
+                    "write unit.variable, or unit.* for all"
+                )
+            if not variable:
+                raise ValueError(f"`output.variables`: {quoted(text)} names no variable; write {unit}.* for all")
         return self
 
     @model_validator(mode="after")
@@ -290,9 +379,15 @@ class Scenario(_Section):
                 f"more than {_MOST_STEPS:.0e} are refused; change one of them"
             )
 
+    def observed(self, unit: str) -> tuple[str, ...]:
+        """What of a unit the time series is to have, as `output.variables` has it; empty where nothing is said."""
+        pairs = (text.partition(".") for text in self.output.variables or ())
+        return tuple(variable for name, _, variable in pairs if name == unit)
+
     def files(self) -> list[str]:
         """The files that the scenario names, beside its own, as it names them."""
         named = [None if self.scene is None else self.scene.mesh, *(entry.fmu for entry in self.units.values())]
+        named.append(None if self.inputs is None else self.inputs.file)
         return list(dict.fromkeys(name for name in named if name is not None))
 
     def resolved(self) -> dict[str, Any]:
@@ -303,6 +398,10 @@ class Scenario(_Section):
         content = self.model_dump(exclude=without or None, by_alias=True)
         if self.scene is None:
             del content["scene"]
+        if self.inputs is None:
+            del content["inputs"]
+        if self.output.variables is None:
+            del content["output"]["variables"]
         return content
 
 
@@ -327,14 +426,19 @@ def checked(content: dict[str, Any], path: Path, assignments: Sequence[str] = ()
     try:
         return Scenario.model_validate(content)
     except ValidationError as error:
-        problems = [_explain(problem) for problem in error.errors()]
-        origin = f"{path} with {', '.join(f'--set {text}' for text in assignments)}" if assignments else str(path)
-        raise InputError(f"{origin}: " + f"\n{origin}: ".join(dict.fromkeys(problems))) from None
+        problems = list(dict.fromkeys(_explain(problem) for problem in error.errors()))
+        if len(problems) > _MOST_PROBLEMS:
+            problems[_MOST_PROBLEMS:] = [f"and {len(problems) - _MOST_PROBLEMS} more problems"]
+        origin = str(path)
+        if assignments:
+            origin += " with " + shortened(", ".join(f"--set {text}" for text in assignments), _LONGEST_ORIGIN)
+        raise InputError(f"{origin}: " + f"\n{origin}: ".join(problems)) from None
 
 
 def _read(path: Path) -> Any:
     try:
-        return _yaml(path.read_bytes())
+        with path.open("rb") as file:
+            return parse_yaml(file.read(LARGEST_TEXT + 1))
     except FileNotFoundError:
         raise InputError(f"{path}: no such scenario file") from None
     except IsADirectoryError:
@@ -345,43 +449,24 @@ def _read(path: Path) -> Any:
         raise InputError(f"{path}: {error}") from None
 
 
-def _yaml(text: bytes | str) -> Any:
-    """The content of `text`; ValueError says what is no YAML, where, and what to do about it."""
-    try:
-        return YAML(typ="safe", pure=True).load(text)
-    except ReaderError as error:
-        raise ValueError(f"not a text file (position {error.position}); save it as plain text in UTF-8") from None
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line = "" if mark is None else f" in line {mark.line + 1}"
-        problem = " ".join(str(error.problem or error.context).split())
-        if "duplicate key" in problem:
-            problem = problem.partition(" with value")[0]
-        remedy = next((f"; {remedy}" for sign, remedy in _YAML_REMEDIES.items() if sign in problem), "")
-        raise ValueError(f"not valid YAML{line}: {problem}{remedy}") from None
-    except RecursionError:
-        raise ValueError("not valid YAML: nested too deeply") from None
-    # A value that does not fit its tag, or a date that does not exist, ends in whatever the constructor trips over.
-    except Exception as error:
-        raise ValueError(f"not valid YAML: {error}; put the text in quotes") from None
-
-
 def _assign(content: dict[str, Any], assignment: str) -> None:
     key, separator, text = assignment.partition("=")
     *parents, last = [part.strip() for part in key.split(".")]
-    if not separator or not all((*parents, last)):
-        raise InputError(f"--set {assignment}: write it as key.path=value, e.g. --set run.stop_ms=100")
+    told = shortened(assignment, _LONGEST_ORIGIN)
+    if not separator or not all((*parents, last)) or len(parents) > _DEEPEST_KEY or not key.isprintable():
+        raise InputError(f"--set {told}: write it as key.path=value, e.g. --set run.stop_ms=100")
     try:
-        value = _yaml(text)
+        value = parse_yaml(text)
     except ValueError as error:
-        raise InputError(f"--set {assignment}: the value is {error}") from None
+        raise InputError(f"--set {told}: the value is {error}") from None
     target = content
-    for parent in parents:
+    for number, parent in enumerate(parents):
         section = target.get(parent)
         if not isinstance(section, dict | None):
+            whole = shortened(".".join(parents[: number + 1]))
             raise InputError(
-                f"--set {assignment}: '{parent}' holds {_short(section)}, not a section; set it as a whole, "
-                f"--set {key.partition(parent)[0]}{parent}=..."
+                f"--set {told}: '{shortened(parent)}' holds {_short(section)}, not a section; set it as a whole, "
+                f"--set {whole}=..."
             )
         # A copy: in YAML two sections can be one and the same, by an alias.
         target[parent] = dict(section or {})
@@ -390,7 +475,8 @@ def _assign(content: dict[str, Any], assignment: str) -> None:
 
 
 def _explain(problem: Mapping[str, Any]) -> str:
-    location, kind, given = [str(part) for part in problem["loc"] if part != "[key]"], problem["type"], problem["input"]
+    location = [shortened(str(part)) for part in problem["loc"] if part not in ("[key]", _AS_TEXT, _AS_ENTRY)]
+    kind, given = problem["type"], problem["input"]
     key, is_key = ".".join(location), "[key]" in problem["loc"]
     context = problem.get("ctx", {})
     if kind == "extra_forbidden":
@@ -440,15 +526,13 @@ def _nearest(given: Any, expected: str) -> str:
 
 
 def _short(given: Any) -> str:
-    if given is None:
-        return "empty"
-    text = repr(given)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+    return "empty" if given is None else quoted(given)
 
 
 def _keys_at(location: Sequence[str]) -> list[str]:
     """The keys that the section at `location` may have."""
     sections: dict[str, type[BaseModel]] = {"scene": Scene, "coupling": Coupling, "run": Run, "output": Output}
+    sections |= {"connections": ConnectionEntry, "inputs": Inputs}
     section = UnitEntry if location[:1] == ["units"] else sections.get(location[0], Scenario) if location else Scenario
     if location[:2] == ["coupling", "adaptive"]:
         section = Adaptive

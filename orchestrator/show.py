@@ -1,6 +1,6 @@
 """`cosim show`: what a scenario builds, exchanges and solves, before anything runs; and what it does without."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from math import ceil
 
 import numpy as np
@@ -10,8 +10,9 @@ from .coupling.build import idle
 from .coupling.connections import Connection
 from .coupling.loops import groups_in_order
 from .coupling.master import stepping_order
+from .participants.driven import Driven
 from .participants.native import Mesh, element_quality
-from .participants.participant import Participant
+from .participants.participant import Participant, Port
 from .scenario import Scenario
 
 #: 10–90 % width of a depolarising front in mm (model.md, Numbers); an element longer than half of it is too coarse.
@@ -31,6 +32,7 @@ def describe(assembly: Assembly) -> str:
         "mesh": [] if mesh is None else list(_mesh(mesh)),
         "units": list(_units(scenario, participants)),
         "connections": [str(link) + _fixed(link, participants) for link in connections] or ["none"],
+        "signals": list(_driven(scenario, participants)),
         "loops": _loops(order, connections) or ["none: one ordered sweep is exact, there is nothing to iterate"],
         "order": [" -> ".join(order)],
         "convergence": [f"{name}: {criterion}" for name, criterion in assembly.converged.items()],
@@ -118,12 +120,29 @@ def _exchange(
 
 def _absent(participants: Mapping[str, Participant], connections: Sequence[Connection]) -> Iterator[str]:
     fed = {(link.target.unit, link.target.name) for link in connections}
+    fed |= {(name, signal) for name, signals in _signals(participants).items() for signal in signals}
     for name, participant in participants.items():
         for port in participant.inputs.values():
             if not port.live:
                 yield f"{name}.{port.name}: {port.needs} of the unit is 0, so it has no influence and is not connected"
-            elif (name, port.name) not in fed:
+            elif (name, port.name) not in fed and not _fed_in_part(name, port, fed):
                 yield f"{name}.{port.name}: no unit gives it, so it keeps its start value"
+
+
+def _fed_in_part(unit: str, port: Port, fed: Set[tuple[str, str]]) -> bool:
+    """Whether single elements of an array are fed."""
+    return any(name == unit and element.startswith(f"{port.name}[") for name, element in fed)
+
+
+def _driven(scenario: Scenario, participants: Mapping[str, Participant]) -> Iterator[str]:
+    for name, signals in _signals(participants).items():
+        for signal in signals:
+            yield f"{scenario.inputs.file if scenario.inputs else ''} -> {name}.{signal}"
+
+
+def _signals(participants: Mapping[str, Participant]) -> dict[str, list[str]]:
+    """The inputs of each unit that follow signals of a file."""
+    return {name: list(unit.signals) for name, unit in participants.items() if isinstance(unit, Driven)}
 
 
 def _warnings(scenario: Scenario, mesh: Mesh | None) -> Iterator[str]:

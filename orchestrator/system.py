@@ -10,6 +10,7 @@ from ..fmus.model_description import INPUT_INTERPOLATION
 from ..fmus.system import Component, Link, System
 from .assembly import called_directly, make_participants
 from .coupling.connections import connect
+from .errors import InputError
 from .participants.fmu_variables import declares_ramps
 from .participants.native import Mesh
 from .scenario import Scenario
@@ -25,8 +26,10 @@ def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[
 
     Its connections are all that the scenario resolves to, those found by name included. InputError as for a run.
     """
+    if scenario.inputs is not None:
+        raise InputError("inputs: a system has no place for signals of a file; remove `inputs`")
     with ExitStack() as stack:
-        participants = make_participants(stack, called_directly(scenario), base, mesh)
+        participants = make_participants(stack, called_directly(scenario), base, mesh, described=True)
         connections = connect(participants, scenario.connections, scenario.connect_by_name)
     components = []
     for name, entry in scenario.units.items():

@@ -3,10 +3,13 @@
 A unit that steps needs its inputs over the step. An output that has been computed for the step's end is known there;
 of another only the past is known, and it is extrapolated by a polynomial through the last exchanges (order 0: its last
 value). A unit that ramps its inputs gets their values at the begin and the end of its step; any other sees the value
-at the end, held. FMI 2.0 leaves open which time an input belongs to that is set before a step (its section 4.2.4 lets a
-master set what it likes); here it is always the step's end.
+at the end, held. A discrete output, a whole number or a text for instance, changes at events only: it is neither
+extrapolated nor ramped, and is what it was at the last exchange until it is known anew. FMI 2.0 leaves open which time
+an input belongs to that is set before a step (its section 4.2.4 lets a master set what it likes); here it is always the
+step's end.
 """
 
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParticipantError
-from ..participants.participant import Participant, Ramp, Values
-from .connections import Connection, End
+from ..participants.participant import Participant, Port, Ramp, Values
+from .connections import Connection, End, fitted
 from .history import History
 
 _MS_PER_S = 1000.0
@@ -53,6 +56,8 @@ class Exchange:
         self._values: dict[End, Values] = {}
         self._before: dict[End, Values] = {}
         self._histories: dict[End, History] = {}
+        # In order, each once.
+        self._discrete: dict[End, None] = {}
         # The connected inputs of each unit as they were when it was stepped last: where their ramps begin.
         self._begins: dict[str, dict[End, Values]] = {}
         self._known: set[End] = set()
@@ -62,7 +67,7 @@ class Exchange:
 
     @property
     def moving(self) -> list[End]:
-        """The connected outputs that change with time."""
+        """The connected outputs that change continuously with time."""
         return list(self._histories)
 
     @property
@@ -74,6 +79,11 @@ class Exchange:
     def extrapolation(self) -> int:
         """Order by which inputs that are not known yet are extrapolated."""
         return self._behaviour.extrapolation
+
+    @property
+    def discrete(self) -> list[End]:
+        """The connected outputs that change at events: of them only their equality has a meaning."""
+        return list(self._discrete)
 
     # --- a step -------------------------------------------------------------------------------------------------------
 
@@ -97,7 +107,7 @@ class Exchange:
         self._begins[unit] = {
             link.source: self._values[link.source]
             for link in self._connections
-            if link.target.unit == unit and link.source in self._values and not self._is_fixed(link.source)
+            if link.target.unit == unit and link.source in self._histories
         }
 
     def undo(self) -> None:
@@ -116,7 +126,12 @@ class Exchange:
                 self._values[end] = self._fetch(end)
                 self._known.add(end)
                 self._collected.add(end)
-                if initially and not participant.outputs[end.name].fixed:
+                port = participant.outputs[end.name]
+                if port.fixed or not initially:
+                    continue
+                if port.discrete:
+                    self._discrete[end] = None
+                else:
                     self._histories[end] = History(self._depth)
                     self._remember(end)
 
@@ -127,16 +142,16 @@ class Exchange:
         for link in self._connections:
             if link.target.unit != unit or link.source not in self._values:
                 continue
-            fixed = participant.inputs[link.target.name].fixed or self._is_fixed(link.source)
-            if fixed and not initially:
+            port = participant.inputs[link.target.name]
+            if (port.fixed or self._is_fixed(link.source)) and not initially:
                 continue
             at_end = self._at_end(link.source)
             self._uses[link] = Use(at_end, ramps)
             with blaming(unit):
-                if ramps:
-                    participant.ramp(link.target.name, link.ramped(self._ramp(unit, link.source)))
+                if ramps and not port.discrete:
+                    participant.ramp(port.name, self._ramp(unit, link, port))
                 else:
-                    participant.set(link.target.name, link.carried(at_end))
+                    participant.set(port.name, fitted(link.carried(at_end), port))
         if initially:
             self.mark(unit)
 
@@ -151,6 +166,8 @@ class Exchange:
 
     def foretold(self, end: End, order: int | None = None) -> Values:
         """What the past values say of an output at the step's end, by the inputs' order if none is given."""
+        if end not in self._histories:
+            return self._values[end]
         return self._histories[end].extrapolated(self._end, self._behaviour.extrapolation if order is None else order)
 
     def begun(self, link: Connection) -> Values:
@@ -166,8 +183,8 @@ class Exchange:
         return end in self._collected
 
     def depth(self, end: End) -> int:
-        """How many past values of an output are known."""
-        return len(self._histories[end].samples())
+        """How many past values of an output are known; of a discrete one the last."""
+        return len(self._histories[end].samples()) if end in self._histories else 1
 
     def value(self, unit: str, name: str) -> Values:
         """The value of an output at the latest exchange, fetched if it is not connected."""
@@ -180,6 +197,7 @@ class Exchange:
         """All that `resume` needs, between two steps."""
         return {
             "values": {str(end): value for end, value in self._values.items() if end in self._histories},
+            "discrete": {str(end): _storable(self._values[end]) for end in self._discrete},
             "times": {
                 str(end): np.array([time for time, _ in history.samples()]) for end, history in self._histories.items()
             },
@@ -197,6 +215,8 @@ class Exchange:
         for end, history in self._histories.items():
             self._values[end] = memory["values"][str(end)]
             history.resume(list(zip(memory["times"][str(end)].tolist(), memory["samples"][str(end)], strict=True)))
+        for end in self._discrete:
+            self._values[end] = _restored(memory["discrete"][str(end)], self._values[end])
         sources = {str(link.source): link.source for link in self._connections}
         for unit, begins in memory["begins"].items():
             self._begins[unit] = {sources[name]: value for name, value in begins.items()}
@@ -208,12 +228,20 @@ class Exchange:
             return self._values[source]
         return self.foretold(source)
 
-    def _ramp(self, unit: str, source: End) -> Ramp:
-        begin, end = self._begins[unit].get(source, self._values[source]), self._at_end(source)
-        if self._behaviour.extrapolation < 2:
-            return Ramp(begin, end)
-        known = source in self._known
-        return Ramp(begin, end, 0.0 * end if known else self._histories[source].curvature())
+    def _ramp(self, unit: str, link: Connection, port: Port) -> Ramp:
+        """How the input `port` runs over the step, fed by `link`."""
+        source, curvature = link.source, None
+        end = self._at_end(source)
+        if source not in self._histories:
+            # A unit that ramps its inputs would ramp from the value before: there is no way but to begin where it ends.
+            held = fitted(link.carried(end), port)
+            return Ramp(held, held)
+        begin = self._begins[unit].get(source, self._values[source])
+        if self._behaviour.extrapolation >= 2:
+            curvature = 0.0 * end if source in self._known else self._histories[source].curvature()
+        ramp = link.ramped(Ramp(begin, end, curvature))
+        curvature = None if ramp.curvature is None else fitted(ramp.curvature, port)
+        return Ramp(fitted(ramp.begin, port), fitted(ramp.end, port), curvature)
 
     def _remember(self, end: End) -> None:
         if end in self._histories:
@@ -240,6 +268,20 @@ def blaming(unit: str) -> Iterator[None]:
 
 
 def _check_finite(end: End, values: Values) -> None:
-    if not np.isfinite(values).all():
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
         index = np.argwhere(~np.isfinite(np.atleast_1d(values)))[0].tolist()
         raise ParticipantError(f"its output {end.name} is not finite, first at index {index}")
+
+
+def _storable(values: Values) -> Values:
+    """`values` as numbers, whatever they are: a file of arrays has no texts of any length."""
+    if values.dtype.kind != "U":
+        return values
+    return np.frombuffer(json.dumps(values.tolist()).encode(), np.uint8)
+
+
+def _restored(stored: Values, like: Values) -> Values:
+    """What `_storable` made of values of the type and shape of `like`."""
+    if like.dtype.kind != "U":
+        return stored.astype(like.dtype)
+    return np.array(json.loads(stored.tobytes()), dtype=np.str_).reshape(like.shape)

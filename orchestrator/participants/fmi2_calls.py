@@ -1,12 +1,24 @@
 """The calls of an FMI 2.0 co-simulation FMU, through FMPy."""
 
 from contextlib import suppress
+from ctypes import byref
 from pathlib import Path
 from typing import Any
 
-from fmpy.fmi2 import FMU2Slave, fmi2False, fmi2Integer
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2Boolean,
+    fmi2Discard,
+    fmi2Integer,
+    fmi2LastSuccessfulTime,
+    fmi2Real,
+    fmi2Terminated,
+    fmi2True,
+)
 
 from ...fmus.model_description import TOOL
+from ..errors import ParticipantTerminated
 from .fmu_log import Fmi2Log
 from .fmu_variables import Field
 
@@ -18,7 +30,9 @@ class Fmi2Calls:
         # Not the description itself: that of a heart holds some ten thousand variables.
         self._guid, self._model = description.guid, description.coSimulation.modelIdentifier
         self._slave: Any = None
-        self.log = Fmi2Log(formats=not _gives_texts(description.generationTool or ""))
+        self._is_python = _is_python(description.generationTool or "")
+        # FMUs in Python log plain texts: they never give arguments.
+        self.log = Fmi2Log(formats=not self._is_python)
         self.takes_derivatives = bool(description.coSimulation.canInterpolateInputs)
 
     def instantiate(self, folder: Path, name: str) -> None:
@@ -42,9 +56,12 @@ class Fmi2Calls:
         """See Calls."""
         self._slave.freeInstance()
 
-    def enter_initialization_mode(self) -> None:
+    def setup_experiment(self) -> None:
         """See Calls."""
         self._slave.setupExperiment(startTime=0.0)
+
+    def enter_initialization_mode(self) -> None:
+        """See Calls."""
         self._slave.enterInitializationMode()
 
     def exit_initialization_mode(self) -> None:
@@ -57,11 +74,13 @@ class Fmi2Calls:
 
     def set(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi2SetReal(self._slave.component, field.references, field.size, field.buffer)
+        call = getattr(self._slave, f"fmi2Set{field.kind}")
+        call(self._slave.component, field.references, field.size, field.buffer)
 
     def get(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi2GetReal(self._slave.component, field.references, field.size, field.buffer)
+        call = getattr(self._slave, f"fmi2Get{field.kind}")
+        call(self._slave.component, field.references, field.size, field.buffer)
 
     def set_derivative(self, field: Field, order: int) -> None:
         """See Calls (FMI 2.0.4, section 4.2.1)."""
@@ -78,8 +97,31 @@ class Fmi2Calls:
 
     def step(self, time: float, size: float) -> None:
         """See Calls."""
-        # False: the master may go back to before the step.
-        self._slave.doStep(time, size, fmi2False)
+        # True: the master goes back to the step's begin at most, which is not prior to it (section 4.2.2). An FMU may
+        # commit what it computed up to there, and some commit only then.
+        try:
+            self._slave.doStep(time, size, fmi2True)
+        except FMICallException as error:
+            if error.status == fmi2Discard and self._has_ended():
+                raise self._end() from None
+            raise
+
+    def _has_ended(self) -> bool:
+        """Whether the FMU discarded a step because it asks for the end (section 4.2.3)."""
+        if self._is_python and self.log.errors:
+            # PythonFMU's wrapper says of every discarded step that it is the end, of one that failed too.
+            return False
+        ended = fmi2Boolean()
+        with suppress(FMICallException), self.log.aside():
+            self._slave.fmi2GetBooleanStatus(self._slave.component, fmi2Terminated, byref(ended))
+        return bool(ended.value)
+
+    def _end(self) -> ParticipantTerminated:
+        end, time = ParticipantTerminated("it asks for the end of the simulation (fmi2Terminated)"), fmi2Real()
+        with suppress(FMICallException), self.log.aside():
+            self._slave.fmi2GetRealStatus(self._slave.component, fmi2LastSuccessfulTime, byref(time))
+            end.time_s = time.value
+        return end
 
     def save(self) -> Any:
         """See Calls."""
@@ -102,6 +144,6 @@ class Fmi2Calls:
         return self._slave.deSerializeFMUstate(data)
 
 
-def _gives_texts(tool: str) -> bool:
-    """Whether the FMUs that `tool` made log plain texts: they never give arguments."""
+def _is_python(tool: str) -> bool:
+    """Whether the FMUs that `tool` made are in Python, behind PythonFMU's wrapper or this project's."""
     return "PythonFMU" in tool or tool.startswith(TOOL)

@@ -9,7 +9,7 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from ..errors import ParticipantError
+from ..errors import ParticipantError, ParticipantTerminated
 from .fmu_log import FmuLog
 from .fmu_variables import Field
 
@@ -41,6 +41,9 @@ class Fmi3Calls:
         """See Calls."""
         self._slave.freeInstance()
 
+    def setup_experiment(self) -> None:
+        """See Calls; in FMI 3.0 the experiment begins with the initialization mode."""
+
     def enter_initialization_mode(self) -> None:
         """See Calls."""
         self._slave.enterInitializationMode(startTime=0.0)
@@ -55,15 +58,13 @@ class Fmi3Calls:
 
     def set(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi3SetFloat64(
-            self._slave.component, field.references, len(field.references), field.buffer, field.size
-        )
+        call = getattr(self._slave, f"fmi3Set{field.kind}")
+        call(self._slave.component, field.references, len(field.references), field.buffer, field.size)
 
     def get(self, field: Field) -> None:
         """See Calls."""
-        self._slave.fmi3GetFloat64(
-            self._slave.component, field.references, len(field.references), field.buffer, field.size
-        )
+        call = getattr(self._slave, f"fmi3Get{field.kind}")
+        call(self._slave.component, field.references, len(field.references), field.buffer, field.size)
 
     def set_derivative(self, field: Field, order: int) -> None:
         """See Calls."""
@@ -77,10 +78,16 @@ class Fmi3Calls:
 
     def step(self, time: float, size: float) -> None:
         """See Calls."""
-        # False: the master may go back to before the step.
-        _, terminate, _, _ = self._slave.doStep(time, size, False)
+        # True: the master goes back to the step's begin at most, which is not prior to it (section 4.2.1).
+        _, terminate, early, reached = self._slave.doStep(time, size, True)
         if terminate:
-            raise ParticipantError("it asks for the end of the simulation (terminateSimulation)")
+            end = ParticipantTerminated("it asks for the end of the simulation (terminateSimulation)")
+            end.time_s = reached
+            raise end
+        if early:
+            raise ParticipantError(
+                f"it returned from its step early, at {reached:g} s, which it was not allowed to (earlyReturnAllowed)"
+            )
 
     def save(self) -> Any:
         """See Calls."""

@@ -4,38 +4,46 @@ Fields live in buffers that are made once and handed to the raw FMI calls (see `
 ten times as much. What the two versions of FMI call differently is in `fmi2_calls` and `fmi3_calls`.
 """
 
+import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ...fmus.model_description import INPUT_INTERPOLATION
-from ..errors import InputError, ParticipantError
+from ..activity import doing
+from ..errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
 from .fmi2_calls import Fmi2Calls
 from .fmi3_calls import Fmi3Calls
-from .fmu_description import read_description
+from .fmu_description import Description, read_description
+from .fmu_file import FmuFile, check_binary
 from .fmu_log import FmuLog
 from .fmu_variables import (
+    READABLE,
     Field,
     check_parameters,
     check_start,
     declares_ramps,
-    is_memoryless,
+    fields,
+    ports,
     ramps_itself,
-    real_fields,
 )
-from .participant import Abilities, Parameters, Ramp, Values, Wait
+from .participant import Abilities, Parameters, Ports, Ramp, Values, Wait
 from .ramping import PendingRamps
 
 _FATAL = 4
+
+_MS_PER_S = 1000.0
+
+#: The highest time derivative of an input that there is a value for.
+_HIGHEST_ORDER = 2
 
 _Result = TypeVar("_Result")
 
@@ -59,8 +67,11 @@ class Calls(Protocol):
     def free_instance(self) -> None:
         """Free the instance and unload the FMU."""
 
+    def setup_experiment(self) -> None:
+        """Set up an experiment from time 0 on: before any value is set, for some FMUs reset their parameters then."""
+
     def enter_initialization_mode(self) -> None:
-        """Begin the initialization, of an experiment from time 0 on."""
+        """Begin the initialization."""
 
     def exit_initialization_mode(self) -> None:
         """End it."""
@@ -81,7 +92,7 @@ class Calls(Protocol):
         """Set a variable of any type, an array to one value everywhere; `variable` is FMPy's."""
 
     def step(self, time: float, size: float) -> None:
-        """Advance from `time` by `size`."""
+        """Advance from `time` by `size`; ParticipantTerminated if the FMU asks for the end of the simulation."""
 
     def save(self) -> Any:
         """The state."""
@@ -102,42 +113,77 @@ class Calls(Protocol):
 #: By the version that a model description begins with.
 _CALLS: dict[str, Callable[[Any], Calls]] = {"2.0": Fmi2Calls, "3.0": Fmi3Calls}
 
+#: The FMUs loaded in this process that can be there once only, by identifier and GUID, and whose they are.
+_ONLY_ONES: dict[tuple[str, str], str] = {}
+
 
 class FmuParticipant:
-    """An FMU, extracted and instantiated; `close` frees the instance and removes the extracted files."""
+    """An FMU, extracted and instantiated; `close` frees the instance and removes the extracted files.
+
+    Parameters
+    ----------
+    path:
+        The FMU, or the folder that it was unpacked to.
+    parameters, start:
+        Values of its parameters, and start values of other variables.
+    ramps:
+        Lets inputs run linearly over a step where the FMU can do that.
+    observe:
+        Variables to be recorded, as names or with `*` and `?`.
+    loaded:
+        False reads the description only: ports and abilities are known, and nothing of the FMU's code is run.
+    """
 
     def __init__(
-        self, name: str, path: Path, parameters: Parameters, start: Parameters | None = None, ramps: bool = False
+        self,
+        name: str,
+        path: Path,
+        parameters: Parameters,
+        start: Parameters | None = None,
+        ramps: bool = False,
+        observe: Sequence[str] = (),
+        loaded: bool = True,
     ) -> None:
         self.name = name
         self._calls: Calls | None = None
         self._initialized = False
         self._folder: Path | None = None
+        self._only: tuple[str, str] | None = None
         with self._naming(path):
-            description = read_description(path)
-            if description.fmiVersion[:3] not in _CALLS or description.coSimulation is None:
-                raise InputError("not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0")
-            if ramps and declares_ramps(description.modelVariables):
+            file = FmuFile(path)
+            description = read_description(file)
+            check_binary(file, description)
+            variables = description.modelVariables
+            if ramps and declares_ramps(variables):
                 parameters = {INPUT_INTERPOLATION: "linear"} | parameters
-            check_parameters(parameters, description.modelVariables)
-            check_start(start or {}, description.modelVariables)
-            inputs, outputs = real_fields(path, description.modelVariables, parameters)
-            self.inputs = {field.port.name: field.port for field in inputs}
-            self.outputs = {field.port.name: field.port for field in outputs}
-            self._fields = {field.port.name: field for field in (*inputs, *outputs)}
-            ramps_by_itself = ramps_itself(description.modelVariables, parameters)
-            self.abilities = _abilities(description.coSimulation, ramps_by_itself, is_memoryless(path))
+            check_parameters(parameters, variables)
+            check_start(start or {}, variables)
+            self._inputs = fields(description, ("input",), parameters)
+            self._outputs = fields(description, ("output",), parameters)
+            self.inputs, self.outputs = ports(self._inputs), ports(self._outputs)
+            self._observed = fields(description, READABLE, parameters) if observe else {}
+            self._observable = ports(self._observed)
+            self.observed = self._observable.chosen(observe, f"unit '{name}'")
+            ramps_by_itself = ramps_itself(variables, parameters)
+            self.abilities = _abilities(description.coSimulation, ramps_by_itself, description.memoryless)
+            self._elements: dict[tuple[bool, str], Field] = {}
             self._pending = PendingRamps()
             self._ramps: dict[str, Ramp] = {}
-            calls = _CALLS[description.fmiVersion[:3]](description)
+            self._order = _HIGHEST_ORDER
+            calls = _CALLS[description.fmiVersion](description)
             self._log = calls.log
+            self._log.instance = name
             self._takes_derivatives = calls.takes_derivatives
+            if not loaded:
+                return
             try:
+                self._claim(description)
                 self._folder = Path(tempfile.mkdtemp(prefix="cosim-fmu-"))
-                _extract(path, self._folder)
+                file.unpack(self._folder)
                 self._instantiate(calls)
-                self._set_values(description.modelVariables, parameters, "parameter")
-                self._set_values(description.modelVariables, start or {}, "start value")
+                self._set_up()
+                self._set_values(variables, parameters, "parameter")
+                self._set_values(variables, start or {}, "start value")
             except BaseException:
                 self.close()
                 raise
@@ -157,20 +203,44 @@ class FmuParticipant:
 
     def set(self, name: str, values: Values) -> None:
         """See Participant."""
-        field = self._fields[name]
+        field = self._field(name, self._inputs, self.inputs)
         # NumPy would spread a single value over the whole field.
-        if np.shape(values) != field.port.shape:
+        if np.shape(values) != self.inputs[name].shape:
             raise ParticipantError(
-                f"input '{name}' of unit '{self.name}' got shape {np.shape(values)}, expected {field.port.shape}"
+                f"input '{name}' of unit '{self.name}' got shape {np.shape(values)}, expected {self.inputs[name].shape}"
             )
-        field.values[...] = values
+        if field.port.shape != np.shape(values):
+            # An element of a variable that is an array: the others stay as they are.
+            _, values = self.inputs.with_element(name, values, lambda _: self._read(field))
+        field.fill(values)
         self._call(lambda calls: calls.set(field))
 
     def get(self, name: str) -> Values:
         """See Participant."""
-        field = self._fields[name]
+        is_output = self.outputs.known(name)
+        own, known = (self._outputs, self.outputs) if is_output else (self._observed, self._observable)
+        field = self._field(name, own, known)
+        values = self._read(field)
+        return values if field.port.name == name else known.element(name, lambda _: values)
+
+    def _field(self, name: str, own: Mapping[str, Field], known: Ports) -> Field:
+        """The field of a port, or of an element of one; that of the whole where the FMU gives no elements."""
+        if name in own:
+            return own[name]
+        place = known.place(name)
+        if place is None:
+            raise ParticipantError(f"unit '{self.name}' has no variable '{name}'")
+        whole = own[place[0].name]
+        if whole.is_array_variable:
+            return whole
+        key = (own is self._inputs, name)
+        if key not in self._elements:
+            self._elements[key] = whole.element(place[1])
+        return self._elements[key]
+
+    def _read(self, field: Field) -> Values:
         self._call(lambda calls: calls.get(field))
-        return field.values.copy()
+        return field.values()
 
     def ramp(self, name: str, ramp: Ramp) -> None:
         """See Participant: by input derivatives where the FMU takes them, else by its own ramp."""
@@ -189,6 +259,7 @@ class FmuParticipant:
         return lambda: None
 
     def _step(self, time: float, size: float) -> None:
+        self._log.time = time
         self._call(lambda calls: calls.step(time, size))
 
     def _differentiate(self, name: str, ramp: Ramp, size: float) -> None:
@@ -196,12 +267,30 @@ class FmuParticipant:
         self.set(name, ramp.begin)
         slope = (ramp.end - ramp.begin) / size
         derivatives = [slope]
-        if ramp.curvature is not None:
+        if ramp.curvature is not None and self._order > 1:
             derivatives = [slope - 0.5 * size * ramp.curvature, ramp.curvature]
-        field = self._fields[name]
+        field = self._field(name, self._inputs, self.inputs)
         for order, derivative in enumerate(derivatives, start=1):
-            field.values[...] = derivative
-            self._call(partial(_set_derivative, field, order))
+            field.fill(derivative)
+            try:
+                self._call(partial(_set_derivative, field, order))
+            except ParticipantLost:
+                raise
+            except ParticipantError as error:
+                if order == 1:
+                    raise ParticipantError(
+                        f"it takes no derivatives of its inputs, though canInterpolateInputs is true ({error}); "
+                        "use `coupling.interpolation: hold`"
+                    ) from None
+                # FMI 2.0 has no attribute for the highest order that an FMU takes.
+                self._order = order - 1
+                print(
+                    f"note: unit '{self.name}' takes derivatives of its inputs up to order {self._order}; "
+                    f"what `coupling.extrapolation` gives beyond that is left out ({error})",
+                    file=sys.stderr,
+                )
+                self._differentiate(name, ramp, size)
+                return
 
     def save(self) -> Any:
         """See Participant."""
@@ -232,15 +321,28 @@ class FmuParticipant:
         finally:
             self.free(state)
 
+    def log_to(self, path: Path) -> None:
+        """See Participant."""
+        self._log.write_to(path)
+
     def close(self) -> None:
         """See Participant."""
         calls, self._calls = self._calls, None
         if calls is not None:
             # An FMU that failed may refuse to terminate; freeing it is all that is left to do.
-            with suppress(FMICallException):
+            try:
                 if self._initialized:
-                    calls.terminate()
-            calls.free_instance()
+                    self._do(calls, lambda calls: calls.terminate())
+            except ParticipantLost:
+                calls = None
+            except ParticipantError:
+                pass
+        if calls is not None:
+            self._do(calls, lambda calls: calls.free_instance())
+        if self._only is not None:
+            _ONLY_ONES.pop(self._only, None)
+            self._only = None
+        self._log.close()
         if self._folder is not None:
             # An FMU written in Python puts its resources on the path of the process.
             sys.path[:] = [entry for entry in sys.path if not entry.startswith(str(self._folder))]
@@ -253,17 +355,26 @@ class FmuParticipant:
         """Do one FMI call; a bad status, or a logged error (all that some FMUs can return), raises ParticipantError."""
         if self._calls is None:
             raise ParticipantError(f"the FMU of unit '{self.name}' is closed")
+        result = self._do(self._calls, call)
+        if self._log.errors:
+            raise ParticipantError(str(self._log))
+        return result
+
+    def _do(self, calls: Calls, call: Callable[[Calls], _Result]) -> _Result:
+        """All calls of the FMU go through here."""
         self._log.clear()
         try:
-            result = call(self._calls)
+            with doing(f"unit '{self.name}' at {self._log.time * _MS_PER_S:.12g} ms"):
+                return call(calls)
         except FMICallException as error:
             if error.status == _FATAL:
                 # FMI allows no further call, not even to free it; those written in Python would crash the process.
                 self._calls = None
-            raise ParticipantError(str(self._log) or f"{error} The FMU logged no reason") from None
-        if self._log.errors:
-            raise ParticipantError(str(self._log))
-        return result
+            kind = ParticipantLost if error.status == _FATAL else ParticipantError
+            raise kind(str(self._log) or f"{error} The FMU logged no reason") from None
+        except ParticipantTerminated as error:
+            error.args = ("; ".join((*error.args, *self._log.errors)),)
+            raise
 
     @contextmanager
     def _naming(self, path: Path) -> Iterator[None]:
@@ -286,12 +397,34 @@ class FmuParticipant:
     def _instantiate(self, calls: Calls) -> None:
         if self._folder is None:
             raise TypeError("an FMU is extracted before it is instantiated")
+        folder, here = self._folder, Path.cwd()
         try:
-            calls.instantiate(self._folder, self.name)
+            self._do(calls, lambda calls: calls.instantiate(folder, self.name))
         # FMPy raises plain Exceptions for a missing binary or a failed instantiation.
         except Exception as error:
-            raise InputError(f"the FMU cannot be instantiated: {error} {calls.log}".rstrip()) from None
+            # FMPy leaves the process in the folder of a library that cannot be loaded.
+            os.chdir(here)
+            raise InputError(_why_not(str(error), str(calls.log))) from None
         self._calls = calls
+
+    def _claim(self, description: Description) -> None:
+        """InputError if the FMU can be in a process once only, and is there already."""
+        if not description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+            return
+        key = (description.coSimulation.modelIdentifier, description.guid)
+        if key in _ONLY_ONES:
+            raise InputError(
+                f"this FMU can be instantiated only once per process (canBeInstantiatedOnlyOncePerProcess), and unit "
+                f"'{_ONLY_ONES[key]}' has it already; give every unit a process of its own, run.workers: processes"
+            )
+        _ONLY_ONES[key] = self.name
+        self._only = key
+
+    def _set_up(self) -> None:
+        try:
+            self._call(lambda calls: calls.setup_experiment())
+        except ParticipantError as error:
+            raise InputError(f"the FMU takes no experiment that begins at 0 s: {error}") from None
 
     def _set_values(self, variables: Any, values: Parameters, what: str) -> None:
         declared = {variable.name: variable for variable in variables}
@@ -322,9 +455,13 @@ def _set_start(variable: Any, value: Any, calls: Calls) -> None:
     calls.set_start(variable, value)
 
 
-def _extract(path: Path, folder: Path) -> None:
-    try:
-        fmpy.extract(str(path), str(folder))
-    # What zip readers raise on a damaged member, and FMPy's plain Exception for an illegal path.
-    except Exception as error:
-        raise InputError(f"the FMU cannot be extracted ({error})") from None
+def _why_not(error: str, logged: str) -> str:
+    """Why an FMU cannot be instantiated, by what FMPy says of it and what the FMU logged."""
+    if "cannot open shared object file" in error:
+        missing = error.rpartition(". ")[2] if ". " in error else error
+        return f"its library cannot be loaded, because it needs another one: {missing}; install that"
+    if any(sign in error for sign in ("ELF", "file too short", "mach-o", "incompatible architecture")):
+        return f"its library is damaged, or made for another machine: {error}; export the FMU for this platform"
+    if "undefined symbol" in error or "symbol not found" in error:
+        return f"its library is incomplete: {error}; every function of FMI has to be there"
+    return f"the FMU cannot be instantiated: {error} {logged}".rstrip()

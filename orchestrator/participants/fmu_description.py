@@ -1,21 +1,26 @@
 """The model description of an FMU, read by FMPy but for the many variables of FMI 2.0.
 
 A heart's four FMUs have 113 000 scalars. FMPy makes an object of two dozen attributes of each, which takes three
-quarters of the time to set a run up; what the master needs of them is read here, and FMPy is given the rest.
+quarters of the time to set a run up; what the master needs of them is read here, and FMPy is given the rest. Scenarios
+and system packages read all FMUs through here.
 """
 
 import gc
 import io
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from copy import deepcopy
+from dataclasses import dataclass
+from math import prod
 from typing import Any, NamedTuple
 
 import fmpy
 from lxml import etree
 
+from ...fmus.annotations import TOOL
 from ..errors import InputError
+from .fmu_file import FmuFile
 
 _MEMBER = "modelDescription.xml"
 
@@ -25,9 +30,19 @@ _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 #: (FMI 2.0.4, section 2.2.7).
 _EXACT = {("constant", "output"), ("constant", "local"), ("fixed", "parameter"), ("tunable", "parameter")}
 
+_TRUE = ("true", "1")
 
-class ScalarVariable(NamedTuple):
-    """What the master needs of a variable of FMI 2.0; named as in FMPy."""
+#: Value references are 32 bits wide.
+_REFERENCES = 2**32
+
+#: Elements of an array, 160 MB of numbers; more is a slip of the pen, or meant to fill the memory.
+_MOST_ELEMENTS = 20_000_000
+
+_NO_FIELDS: Mapping[str, Mapping[str, str]] = {}
+
+
+class Variable(NamedTuple):
+    """What the master needs of a variable; named as in FMPy. What it leaves to its declared type is filled in."""
 
     name: str
     valueReference: int
@@ -39,45 +54,183 @@ class ScalarVariable(NamedTuple):
     start: str | None
     #: There are no arrays in FMI 2.0.
     shape: tuple[int, ...] = ()
+    relativeQuantity: bool = False
+    #: FMPy's SimpleType.
+    declaredType: Any = None
+
+    @property
+    def items(self) -> dict[int, str]:
+        """The names of an enumeration's items by their numbers."""
+        return {} if self.declaredType is None else {int(item.value): item.name for item in self.declaredType.items}
 
 
-def read_description(path: Path) -> Any:
-    """FMPy's model description of the FMU at `path`; InputError if it is none."""
-    if not path.is_file():
-        raise InputError("no such FMU")
-    try:
-        with _no_collection(), zipfile.ZipFile(path) as archive:
-            root = etree.fromstring(archive.read(_MEMBER), etree.XMLParser(huge_tree=True, resolve_entities=False))
-            if root.get("fmiVersion") != "2.0":
-                return fmpy.read_model_description(str(path), validate=False)
-            variables = [_variable(element) for element in root.iterfind("ModelVariables/ScalarVariable")]
-            for part in ("ModelVariables", "ModelStructure"):
-                for element in root.iterfind(part):
-                    element.clear()
-            description = fmpy.read_model_description(_archive(root), validate=False)
-            description.modelVariables = variables
-            return description
-    # FMPy raises plain Exceptions, and those of zip and XML readers.
-    except Exception as error:
-        raise InputError(f"FMPy cannot read it as an FMU ({error})") from None
+@dataclass(frozen=True)
+class Description:
+    """A model description; what FMPy has of it is named as there.
+
+    `fields` and `memoryless` are what this project's FMUs say beyond FMI: attributes of inputs and outputs by name, and
+    whether outputs follow the inputs whatever was before.
+    """
+
+    fmiVersion: str
+    guid: str
+    generationTool: str
+    coSimulation: Any
+    unitDefinitions: Sequence[Any]
+    defaultExperiment: Any
+    modelVariables: Sequence[Variable]
+    fields: Mapping[str, Mapping[str, str]]
+    memoryless: bool
 
 
-def _variable(element: Any) -> ScalarVariable:
-    value = next(child for child in element if child.tag in _TYPES)
+def read_description(file: FmuFile) -> Description:
+    """The description of an FMU that can be coupled; InputError says why it cannot be, or what is wrong with it."""
+    with _no_collection():
+        root = file.description()
+        version = _version(root)
+        try:
+            head = fmpy.read_model_description(_archive(_head(root) if version == "2.0" else root), validate=False)
+            types = {kind.name: kind for kind in head.typeDefinitions}
+            if version == "2.0":
+                variables = [_variable(element, types) for element in root.iterfind("ModelVariables/ScalarVariable")]
+            else:
+                relative = {
+                    element.get("name"): element.get("relativeQuantity") in _TRUE
+                    for element in root.iterfind("ModelVariables/*[@relativeQuantity]")
+                }
+                variables = [_of_fmpy(variable, relative) for variable in head.modelVariables]
+        except InputError:
+            raise
+        # FMPy raises plain Exceptions.
+        except Exception as error:
+            raise InputError(f"FMPy cannot read it as an FMU ({error or type(error).__name__})") from None
+    _check(variables)
+    own = _own(root)
+    unit = None if own is None else own.find("Unit")
+    return Description(
+        version,
+        head.guid or "",
+        head.generationTool or "",
+        head.coSimulation,
+        head.unitDefinitions,
+        head.defaultExperiment,
+        variables,
+        _NO_FIELDS if own is None else {field.get("name"): dict(field.attrib) for field in own.iter("Field")},
+        unit is not None and unit.get("memoryless") == "true",
+    )
+
+
+def _version(root: Any) -> str:
+    """`2.0` or `3.0`; InputError for what cannot be coupled, each kind by its name."""
+    version = root.get("fmiVersion")
+    if root.tag != "fmiModelDescription" or version is None:
+        raise InputError(
+            f"its {_MEMBER} describes no FMU (the root is {root.tag}, fmiVersion {version or 'not given'})"
+        )
+    if version.startswith("1."):
+        raise InputError("an FMU of FMI 1.0, which is not supported; export it for co-simulation by FMI 2.0 or 3.0")
+    if version != "2.0" and not version.startswith("3."):
+        raise InputError(f"an FMU of FMI {version}, which is not supported; export it by FMI 2.0 or 3.0")
+    if root.find("CoSimulation") is not None:
+        return "2.0" if version == "2.0" else "3.0"
+    for kind, words in (("ModelExchange", "model exchange"), ("ScheduledExecution", "scheduled execution")):
+        if root.find(kind) is not None:
+            raise InputError(
+                f"an FMU for {words} only, which leaves solving to others; export it for co-simulation (CoSimulation)"
+            )
+    raise InputError("an FMU that is not for co-simulation (it has no CoSimulation); export it for co-simulation")
+
+
+def _head(root: Any) -> Any:
+    """The description without its many variables."""
+    head = etree.Element(root.tag, root.attrib)
+    for child in root:
+        if child.tag in ("ModelVariables", "ModelStructure"):
+            etree.SubElement(head, child.tag)
+        else:
+            head.append(deepcopy(child))
+    return head
+
+
+def _variable(element: Any, types: Mapping[str, Any]) -> Variable:
+    value = next((child for child in element if child.tag in _TYPES), None)
+    if value is None:
+        raise InputError(f"its variable '{element.get('name')}' has no type")
     causality, variability = element.get("causality", "local"), element.get("variability", "continuous")
     initial = element.get("initial")
     if initial is None and causality != "input":
         initial = "exact" if (variability, causality) in _EXACT else "calculated"
-    return ScalarVariable(
+    declared = value.get("declaredType")
+    unit = value.get("unit")
+    if declared is None:
+        kind = None
+        relative = value.get("relativeQuantity") in _TRUE
+    else:
+        kind = types.get(declared)
+        if kind is None:
+            raise InputError(f"its variable '{element.get('name')}' is of the type '{declared}', which it lacks")
+        unit = unit or kind.unit
+        relative = value.get("relativeQuantity", "true" if kind.relativeQuantity else "false") in _TRUE
+    return Variable(
         element.get("name"),
         int(element.get("valueReference")),
         value.tag,
         causality,
         variability,
         initial,
-        value.get("unit"),
+        unit,
         value.get("start"),
+        (),
+        relative,
+        kind,
     )
+
+
+def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
+    kind = variable.declaredType
+    return Variable(
+        variable.name,
+        variable.valueReference,
+        variable.type,
+        variable.causality,
+        variable.variability,
+        variable.initial,
+        variable.unit or (None if kind is None else kind.unit),
+        variable.start,
+        variable.shape,
+        # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
+        relative.get(variable.name, bool(kind is not None and kind.relativeQuantity)),
+        kind,
+    )
+
+
+def _check(variables: Sequence[Variable]) -> None:
+    """InputError for names that are not unique, and for value references that no FMU can have."""
+    if len({variable.name for variable in variables}) != len(variables):
+        seen: set[str] = set()
+        for variable in variables:
+            if variable.name in seen:
+                raise InputError(f"two of its variables are named '{variable.name}'; export it with names of their own")
+            seen.add(variable.name)
+    for variable in variables:
+        if not variable.name:
+            raise InputError("one of its variables has no name")
+        if not 0 <= variable.valueReference < _REFERENCES:
+            raise InputError(f"its variable '{variable.name}' has no valid value reference: {variable.valueReference}")
+        if variable.shape and (min(variable.shape) < 0 or prod(variable.shape) > _MOST_ELEMENTS):
+            raise InputError(
+                f"its variable '{variable.name}' has the shape {variable.shape}; dimensions are counts, and more than "
+                f"{_MOST_ELEMENTS} elements are refused"
+            )
+
+
+def _own(root: Any) -> Any:
+    """This project's element of the FMU's annotations; None in foreign FMUs."""
+    for path in ("VendorAnnotations/Tool", "Annotations/Annotation"):
+        for element in root.iterfind(path):
+            if TOOL in (element.get("name"), element.get("type")):
+                return element
+    return None
 
 
 def _archive(root: Any) -> io.BytesIO:

@@ -1,7 +1,10 @@
 """The log messages of FMUs, each brought to the participant it belongs to."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from ctypes import byref
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 from weakref import WeakValueDictionary
 
 from fmpy.fmi2 import (
@@ -16,30 +19,87 @@ from fmpy.logging import addLoggerProxy
 
 from ...fmus.messages import INVALID_INPUT
 
-#: fmi2Status from which a message tells of a failure.
-_ERROR = 3
+#: fmi2Status from which a message tells of a failure, and from which it may tell why one came about.
+_ERROR, _WARNING = 3, 1
+
+
+#: The names of statuses, in both versions of FMI.
+_STATUSES = ("ok", "warning", "discard", "error", "fatal", "pending")
 
 
 class FmuLog:
-    """The errors that one FMU has logged since the last `clear`."""
+    """What one FMU logs, for a file; and the errors among it since the last `clear`.
+
+    `reasons` are what it warned of, or discarded a step by.
+    """
 
     def __init__(self) -> None:
+        self.instance = ""
+        #: Simulated time of the last step that was begun, in s.
+        self.time = 0.0
+        self._lines: list[str] = []
+        self._path: Path | None = None
+        self._file: BinaryIO | None = None
         self.errors: list[str] = []
+        self.reasons: list[str] = []
         self.blames_input = False
 
     def clear(self) -> None:
         """Forget what was logged."""
         self.errors.clear()
+        self.reasons.clear()
         self.blames_input = False
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """What is logged in here is not what the call failed by: a question that an FMU need not answer."""
+        before = list(self.errors), list(self.reasons), self.blames_input
+        try:
+            yield
+        finally:
+            self.errors, self.reasons, self.blames_input = before
 
     def hear(self, status: int, category: bytes, message: bytes) -> None:
         """Take a message; errors are kept until the call that caused them returns."""
+        self._keep(status, category.decode("utf-8", errors="replace"), message.decode("utf-8", errors="replace"))
         if status >= _ERROR:
             self.errors.append(message.decode("utf-8", errors="replace"))
             self.blames_input = category == INVALID_INPUT.encode()
+        elif status >= _WARNING:
+            self.reasons.append(message.decode("utf-8", errors="replace"))
+
+    def write_to(self, path: Path) -> None:
+        """Write all messages to the end of the file at `path` from now on, and those there have been."""
+        self._path = path
+        lines, self._lines = self._lines, []
+        for line in lines:
+            self._write(line)
+
+    def close(self) -> None:
+        """Close the file, if there is one."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def _keep(self, status: int, category: str, message: str) -> None:
+        label = _STATUSES[status] if 0 <= status < len(_STATUSES) else str(status)
+        # A message of several lines is one entry: the others are indented.
+        text = message.rstrip().replace("\r", "").replace("\n", "\n\t")
+        self._write(f"{self.time:.12g} s\t{self.instance}\t{label}\t{category}\t{text}\n")
+
+    def _write(self, line: str) -> None:
+        if self._path is None:
+            self._lines.append(line)
+            return
+        # Made only when there is something to write, and written through at once: a crash loses nothing. That the disk
+        # is full does not concern the FMU that calls here, and what it computes is not harmed by it.
+        with suppress(OSError):
+            if self._file is None:
+                self._file = self._path.open("ab", buffering=0)
+            self._file.write(line.encode("utf-8", errors="replace"))
 
     def __str__(self) -> str:
-        return "; ".join(self.errors)
+        return "; ".join(self.errors or self.reasons)
 
 
 class Fmi2Log(FmuLog):

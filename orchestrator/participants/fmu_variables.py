@@ -1,34 +1,60 @@
 """What an FMU of FMI 2.0 or 3.0 declares: its fields as ports, its parameters, from the model description."""
 
-import re
-import zipfile
-from collections.abc import Iterable, Sequence
-from ctypes import c_double
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from ctypes import (
+    c_bool,
+    c_char_p,
+    c_double,
+    c_float,
+    c_int,
+    c_int8,
+    c_int16,
+    c_int32,
+    c_int64,
+    c_uint8,
+    c_uint16,
+    c_uint32,
+    c_uint64,
+)
+from dataclasses import replace
 from itertools import product
 from math import prod
-from pathlib import Path
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 from fmpy.fmi2 import fmi2ValueReference
-from lxml import etree
 
-from ...fmus.model_description import INPUT_INTERPOLATION, TOOL
-from ..errors import InputError, did_you_mean
-from .participant import Parameters, Port
+from ...fmus.model_description import INPUT_INTERPOLATION
+from ..errors import InputError, ParticipantError, did_you_mean
+from .fmu_description import Description, Variable
+from .participant import INDEXED, Parameters, Port, Ports, Values
 
-_INDEXED = re.compile(r"^(.*)\[(\d+(?:,\d+)*)\]$")
 #: How FMI calls an initial value that the caller may give.
 _STARTED = ("exact", "approx")
 #: The variables that an FMU computes itself.
 _COMPUTED = ("output", "local", "calculatedParameter")
 #: The types of whole numbers, with what they can hold. An enumeration is one too.
-_WHOLE = {"Integer": (-(2**31), 2**31), "Enumeration": (-(2**31), 2**31)}
-_WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1)) for bits in (8, 16, 32, 64)}
-_WHOLE |= {f"UInt{bits}": (0, 2**bits) for bits in (8, 16, 32, 64)}
-#: The types of real numbers, and those of them that are exchanged.
+WHOLE = {"Integer": (-(2**31), 2**31), "Enumeration": (-(2**31), 2**31)}
+WHOLE |= {f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1)) for bits in (8, 16, 32, 64)}
+WHOLE |= {f"UInt{bits}": (0, 2**bits) for bits in (8, 16, 32, 64)}
 _REAL = ("Real", "Float64", "Float32")
-_EXCHANGED = ("Real", "Float64")
+#: The types that are exchanged and recorded.
+_TYPES = (*_REAL, *WHOLE, "Boolean", "String")
+#: The causalities of what can be read.
+READABLE = ("output", "input", "local", "parameter", "calculatedParameter", "structuralParameter", "independent")
+
+#: Types as the functions of FMI 2 and 3 name them, where those have no functions of their own.
+_KINDS = {2: {"Enumeration": "Integer"}, 3: {"Enumeration": "Int64"}}
+#: What the functions take.
+_CTYPES: dict[int, dict[str, Any]] = {
+    2: {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p},
+    3: {"Float64": c_double, "Float32": c_float, "Boolean": c_bool, "String": c_char_p}
+    | {"Int8": c_int8, "Int16": c_int16, "Int32": c_int32, "Int64": c_int64}
+    | {"UInt8": c_uint8, "UInt16": c_uint16, "UInt32": c_uint32, "UInt64": c_uint64},
+}
+#: What participants give of a type; of all others int64.
+_GIVEN = {"Real": np.dtype(np.float64), "Float32": np.dtype(np.float64), "UInt64": np.dtype(np.uint64)}
 
 
 def _accepts(kind: str, value: Any) -> bool:
@@ -36,8 +62,8 @@ def _accepts(kind: str, value: Any) -> bool:
     # To Python a truth value is a number; to a person it is not.
     if isinstance(value, bool):
         return kind == "Boolean"
-    if kind in _WHOLE:
-        least, above = _WHOLE[kind]
+    if kind in WHOLE:
+        least, above = WHOLE[kind]
         return isinstance(value, int) and least <= value < above
     if kind in _REAL:
         return isinstance(value, (int, float))
@@ -48,16 +74,68 @@ def _accepts(kind: str, value: Any) -> bool:
 class Field:
     """A port of an FMU with its value references and values, as the raw FMI calls want them.
 
-    There is a reference for each of the `size` values in FMI 2.0, and one for all in FMI 3.0.
+    There is a reference for each of the `size` values in FMI 2.0, and one for all in FMI 3.0. `kind` is the type in the
+    names of FMI's functions, `fmi2GetReal`, `fmi3GetInt64`.
     """
 
-    def __init__(self, port: Port, references: list[int]) -> None:
+    def __init__(self, port: Port, fmi_type: str, references: Sequence[int], fmi: int) -> None:
         self.port = port
         self.size = port.size
+        self._type, self._fmi = fmi_type, fmi
+        self.kind = _KINDS[fmi].get(fmi_type, fmi_type)
         # The type is the same in FMI 3.0.
         self.references = (fmi2ValueReference * len(references))(*references)
-        self.buffer = (c_double * self.size)()
-        self.values = np.ctypeslib.as_array(self.buffer).reshape(port.shape)
+        self.buffer = (_CTYPES[fmi][self.kind] * self.size)()
+        self._texts = self.kind == "String"
+        self._numbers = None if self._texts else np.ctypeslib.as_array(self.buffer).reshape(port.shape)
+        self._given = _GIVEN.get(port.type, np.dtype(np.int64))
+
+    def element(self, place: int) -> "Field":
+        """The field of one element, in FMI 2.0."""
+        name = list(self.port.elements)[place]
+        port = replace(self.port, name=name, shape=())
+        return Field(port, self._type, [self.references[place]], self._fmi)
+
+    @property
+    def is_array_variable(self) -> bool:
+        """Whether it is one variable of FMI 3.0, whose elements cannot be set by themselves."""
+        return len(self.references) < self.size
+
+    def values(self) -> Values:
+        """What is in the buffer."""
+        if self._numbers is None:
+            texts = [(text or b"").decode("utf-8", errors="replace") for text in self.buffer]
+            return np.array(texts, dtype=np.str_).reshape(self.port.shape)
+        if self.port.type == "Boolean":
+            return self._numbers != 0
+        return self._numbers.astype(self._given)
+
+    def fill(self, values: Values) -> None:
+        """Put `values`, of the port's shape, into the buffer; ParticipantError for what the type cannot hold."""
+        if self._numbers is None:
+            self.buffer[:] = [str(text).encode() for text in np.asarray(values).ravel()]
+            return
+        if self._numbers.dtype == np.float64 or self.port.type == "Boolean":
+            self._numbers[...] = values
+            return
+        self._check(np.asarray(values))
+        self._numbers[...] = values
+
+    def _check(self, values: Values) -> None:
+        kind = self._numbers.dtype if self._numbers is not None else None
+        if kind is None or not values.size:
+            return
+        if kind.kind == "f":
+            wrong = np.abs(values) > np.finfo(kind).max
+        else:
+            limits = np.iinfo(kind)
+            wrong = (values < limits.min) | (values > limits.max)
+        if self.port.items:
+            wrong = wrong | ~np.isin(values, self.port.items)
+        if wrong.any():
+            raise ParticipantError(
+                f"'{self.port.name}' of type {self.port.type} cannot be {np.asarray(values)[wrong].flat[0]}"
+            )
 
 
 def check_parameters(parameters: Parameters, variables: Sequence[Any]) -> None:
@@ -110,71 +188,92 @@ def ramps_itself(variables: Iterable[Any], parameters: Parameters) -> bool:
     )
 
 
-def real_fields(path: Path, variables: Iterable[Any], parameters: Parameters) -> tuple[list[Field], list[Field]]:
-    """The Real inputs and outputs of the FMU at `path` (FMI 3.0: Float64, arrays among them).
+def fields(description: Description, causalities: Sequence[str], parameters: Parameters) -> dict[str, Field]:
+    """The fields of an FMU's variables of some `causalities`, by name.
 
-    Scalars `x[1]`, `x[2]`, … are taken together as one field. `variables` are those of FMPy's model description; a
-    dimension given by a structural parameter has that one's start value. InputError if the indices of a field do not
-    fill an array.
+    Scalars `x[1]`, `x[2]`, … that fill an array, of indices from 1 or from 0, and are of one type and unit are taken
+    together as one field; all others are fields of their own, under their full names. A dimension given by a structural
+    parameter has that one's start value. Binaries and clocks are left out.
     """
-    groups: dict[tuple[str, str], list[tuple[tuple[int, ...], Any]]] = {}
-    values: dict[str, Any] = {}
+    variables = [item for item in description.modelVariables if item.causality in causalities and item.type in _TYPES]
+    fmi = int(description.fmiVersion[0])
+    found = {}
+    for name, base, shape, members in _grouped(variables):
+        port = _port(description, name, base, shape, members[0], parameters)
+        if port.size:
+            found[name] = Field(port, members[0].type, [member.valueReference for member in members], fmi)
+    return found
+
+
+def ports(fields: Mapping[str, Field]) -> Ports:
+    """The ports of `fields`."""
+    return Ports({name: field.port for name, field in fields.items()})
+
+
+_Group = tuple[str, int, tuple[int, ...], list[Variable]]
+
+
+def _grouped(variables: Iterable[Variable]) -> Iterator[_Group]:
+    """Name, first index, shape and members of what `variables` are as scalars and arrays."""
+    groups: dict[str, list[tuple[tuple[int, ...], Variable]]] = {}
     for variable in variables:
-        values[variable.name] = parameters.get(variable.name, variable.start)
-        if variable.causality in ("input", "output") and variable.type in _EXCHANGED:
-            match = None if variable.shape else _INDEXED.match(variable.name)
-            name = match[1] if match else variable.name
-            index = tuple(map(int, match[2].split(","))) if match else ()
-            groups.setdefault((variable.causality, name), []).append((index, variable))
-    annotations = _annotations(path)
-    fields: dict[str, list[Field]] = {"input": [], "output": []}
-    for (causality, name), members in groups.items():
-        members.sort(key=lambda member: member[0])
-        shape = members[-1][0]
-        indices = [index for index, _ in members]
-        # Counted first: a wild index is not to make a list of its size.
-        if len(indices) != prod(shape) or indices != list(product(*(range(1, count + 1) for count in shape))):
-            raise InputError(f"the FMU's variables {name}[…] do not fill an array of shape {shape} with indices from 1")
-        # An array of FMI 3.0 is one variable, without an index.
-        shape = shape or members[0][1].shape
-        extra = annotations.get(name, {})
+        name = variable.name
+        index: tuple[int, ...] = ()
+        if name[-1] == "]" and not variable.shape and (match := INDEXED.match(name)) is not None:
+            name, index = match[1], tuple(map(int, match[2].split(",")))
+        groups.setdefault(name, []).append((index, variable))
+    for name, members in groups.items():
+        if len(members) == 1 and not members[0][0]:
+            # An array of FMI 3.0 is one variable, without an index.
+            yield name, 1, members[0][1].shape, [members[0][1]]
+            continue
+        members.sort(key=itemgetter(0))
+        shape = _filled([index for index, _ in members])
+        alike = {(item.type, item.unit, item.variability, item.causality, len(item.shape)) for _, item in members}
+        if shape is None or len(alike) > 1:
+            yield from ((item.name, 1, item.shape, [item]) for _, item in members)
+        else:
+            yield name, members[0][0][0], shape, [item for _, item in members]
+
+
+def _filled(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...] | None:
+    """The shape of the array that sorted `indices` fill, each from 1 or each from 0; None if they fill none."""
+    first, last = indices[0], indices[-1]
+    if len(first) != len(last) or first not in ((0,) * len(first), (1,) * len(first)) or not first:
+        return None
+    shape = tuple(end - first[0] + 1 for end in last)
+    # Counted first: a wild index is not to make a list of its size.
+    if len(indices) != prod(shape):
+        return None
+    return shape if list(indices) == list(product(*(range(first[0], end + 1) for end in last))) else None
+
+
+def _port(
+    description: Description, name: str, base: int, shape: tuple[int, ...], first: Variable, parameters: Parameters
+) -> Port:
+    extra = description.fields.get(name, {})
+    needs = extra.get("needs")
+    fixed = extra.get("fixed") == "true" or first.variability in ("constant", "fixed")
+    is_real = first.type in _REAL
+    return Port(
+        name,
+        first.unit,
+        shape,
+        extra.get("location", None if shape else "global"),
+        fixed,
+        live=needs is None or _value(description, needs, parameters) != 0.0,
         # Of a foreign FMU every number is worth a column; this project's say so themselves.
-        unsaid = "nothing" if shape or extra else "value"
-        port = Port(
-            name,
-            members[0][1].unit,
-            shape,
-            extra.get("location", None if shape else "global"),
-            extra.get("fixed") == "true" or members[0][1].variability in ("constant", "fixed"),
-            live="needs" not in extra or float(values[extra["needs"]]) != 0.0,
-            record=extra.get("record", unsaid),
-            needs=extra.get("needs"),
-            of=extra.get("of"),
-        )
-        fields[causality].append(Field(port, [variable.valueReference for _, variable in members]))
-    return fields["input"], fields["output"]
+        record=extra.get("record", "nothing" if extra else "value"),
+        needs=needs,
+        of=extra.get("of"),
+        type="Real" if first.type == "Float64" else first.type,
+        discrete=not is_real or (first.variability == "discrete" and not fixed),
+        items=tuple(first.items) if first.type == "Enumeration" else (),
+        base=base,
+    )
 
 
-def is_memoryless(path: Path) -> bool:
-    """Whether the FMU says that its outputs follow its inputs whatever was before; only this project's do."""
-    own = _own_annotations(path)
-    unit = None if own is None else own.find("Unit")
-    return unit is not None and unit.get("memoryless") == "true"
-
-
-def _annotations(path: Path) -> dict[str, dict[str, str]]:
-    """What this project's FMUs say of their fields beyond FMI: attributes by name; empty for foreign FMUs."""
-    own = _own_annotations(path)
-    return {} if own is None else {field.get("name"): dict(field.attrib) for field in own.iter("Field")}
-
-
-def _own_annotations(path: Path) -> Any:
-    """This project's element of the FMU's annotations; None in foreign FMUs."""
-    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as text:
-        # In FMI 2.0 the annotations come before the many variables; nothing after them is parsed.
-        for _, element in etree.iterparse(text, tag=("Tool", "Annotation", "ScalarVariable")):
-            if element.tag == "ScalarVariable":
-                return None
-            if TOOL in (element.get("name"), element.get("type")):
-                return element
-    return None
+def _value(description: Description, parameter: str, parameters: Parameters) -> float:
+    """The value of a Real parameter."""
+    start = next((item.start for item in description.modelVariables if item.name == parameter), None)
+    return float(parameters.get(parameter, start or 0.0))

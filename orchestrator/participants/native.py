@@ -4,6 +4,8 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from ...fmus.cache import cached_fmu
 from ...units.errors import InvalidInput, StepFailure
 from ...units.geometry.registry import build as build_geometry
@@ -22,7 +24,7 @@ from ...units.unit import Unit
 from ...units.variable import Causality, Variable
 from ..errors import InputError, ParticipantError, did_you_mean
 from ..scenario import Scene
-from .participant import Abilities, Parameters, Port, Ramp, Values, Wait
+from .participant import Abilities, Parameters, Port, Ports, Ramp, Values, Wait
 from .ramping import PendingRamps
 
 __all__ = [
@@ -103,7 +105,7 @@ def check_unit(unit: str, parameters: Parameters) -> None:
             raise InputError(str(error)) from None
 
 
-def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[dict[str, Port], dict[str, Port]]:
+def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Ports]:
     """Inputs and outputs of a unit on `mesh`, by name."""
     kind = UNITS[unit]
     given = {variable.name: parameters.get(variable.name, variable.start) for variable in kind.variables()}
@@ -121,9 +123,29 @@ def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[dict[str,
             variable.source.name if isinstance(variable, Statistic) else None,
         )
 
-    inputs = {item.name: port(item) for item in kind.inputs()}
-    outputs = {item.name: port(item) for item in kind.outputs()}
+    inputs = Ports({item.name: port(item) for item in kind.inputs()})
+    outputs = Ports({item.name: port(item) for item in kind.outputs()})
     return inputs, outputs
+
+
+def _parameter_ports(unit: str) -> Ports:
+    """The parameters of a unit, as they are recorded."""
+    kinds = {float: "Real", int: "Integer", str: "String"}
+    declared = (item for item in UNITS[unit].variables() if item.causality is Causality.PARAMETER)
+    return Ports(
+        {
+            item.name: Port(
+                item.name,
+                item.unit,
+                (),
+                fixed=True,
+                record="value",
+                type=kinds[type(item.start)],
+                discrete=not isinstance(item.start, float),
+            )
+            for item in declared
+        }
+    )
 
 
 def element_quality(mesh: Mesh) -> Values:
@@ -147,11 +169,22 @@ def fmu_of_unit(unit: str, mesh: Mesh, fmu_dir: Path | None, fmi: int = 2) -> Pa
 class NativeParticipant:
     """A unit called directly."""
 
-    def __init__(self, name: str, unit: str, mesh: Mesh, parameters: Parameters, ramps: bool = False) -> None:
+    def __init__(
+        self,
+        name: str,
+        unit: str,
+        mesh: Mesh,
+        parameters: Parameters,
+        ramps: bool = False,
+        observe: Sequence[str] = (),
+    ) -> None:
         self.name = name
         if ramps and any(variable.name == INPUT_INTERPOLATION for variable in UNITS[unit].variables()):
             parameters = {INPUT_INTERPOLATION: "linear"} | parameters
         self.inputs, self.outputs = unit_ports(unit, mesh, parameters)
+        known = Ports(self.outputs | self.inputs | _parameter_ports(unit))
+        self.observed = known.chosen(observe, f"unit '{name}'")
+        self._known = known
         self._unit: Unit = UNITS[unit](mesh)
         try:
             self._unit.instantiate(parameters)
@@ -179,6 +212,8 @@ class NativeParticipant:
     def set(self, name: str, values: Values) -> None:
         """See Participant."""
         try:
+            if name not in self.inputs:
+                name, values = self.inputs.with_element(name, values, self._unit.get)
             self._unit.set(name, values)
         except InvalidInput as error:
             raise ParticipantError(str(error)) from error
@@ -189,7 +224,13 @@ class NativeParticipant:
 
     def get(self, name: str) -> Values:
         """See Participant."""
-        return self._unit.get(name)  # type: ignore[no-any-return]
+        if name not in self._known:
+            return self._known.element(name, self.get)
+        try:
+            values = self._unit.get(name)
+        except (InvalidInput, StepFailure) as error:
+            raise ParticipantError(str(error)) from error
+        return values if isinstance(values, np.ndarray) else np.asarray(values)
 
     def start(self, time: float, size: float) -> Wait:
         """See Participant; the step is done when this returns."""
@@ -221,6 +262,9 @@ class NativeParticipant:
     def unpack(self, data: bytes) -> None:
         """See Participant."""
         self._unit.set_state(Snapshot.from_bytes(data))
+
+    def log_to(self, path: Path) -> None:
+        """See Participant; a unit that is called directly logs nothing."""
 
     def close(self) -> None:
         """See Participant."""

@@ -1,13 +1,26 @@
 """What the master couples: anything that has ports, can be initialised, and steps in time."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from itertools import product
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-Values = NDArray[np.float64]
+from ..errors import InputError, did_you_mean
+
+#: Numbers of whatever type, or texts; those of real ports are float64.
+Values = NDArray[Any]
+
+#: A name with indices, and what comes before them.
+INDEXED = re.compile(r"^(.+)\[((?:0|[1-9][0-9]{0,9})(?:,(?:0|[1-9][0-9]{0,9}))*)\]$", re.DOTALL)
+
+#: Types of real numbers, as `Port.type` has them.
+_REAL = ("Real", "Float32")
 
 
 @dataclass(frozen=True)
@@ -18,6 +31,9 @@ class Port:
     where unknown. A `fixed` port is exchanged once, at initialisation. A port that is not `live` has no influence with
     the parameters given, because the one it `needs` is zero, and is not connected. `record` says what a time series
     keeps: `value`, `probes`. A number that is drawn from a field, such as its mean, is `of` that output.
+
+    `type` is that of FMI; Float64 is a Real here. A `discrete` port changes at events only: it is held between
+    exchanges. An enumeration has `items`, the numbers it can be. Elements of an array are counted from `base`.
     """
 
     name: str
@@ -29,6 +45,24 @@ class Port:
     record: str = "nothing"
     needs: str | None = None
     of: str | None = None
+    type: str = "Real"
+    discrete: bool = False
+    items: tuple[int, ...] = ()
+    base: int = 1
+
+    @property
+    def is_real(self) -> bool:
+        """Whether its values are real numbers."""
+        return self.type in _REAL
+
+    @property
+    def elements(self) -> Iterator[str]:
+        """The names of its scalars in row-major order: `u[1,1]`, `u[1,2]`, …; its own name if it is a scalar."""
+        if not self.shape:
+            yield self.name
+            return
+        for indices in product(*(range(self.base, self.base + count) for count in self.shape)):
+            yield f"{self.name}[{','.join(map(str, indices))}]"
 
     @property
     def size(self) -> int:
@@ -39,6 +73,66 @@ class Port:
     def column(self) -> str:
         """The port's name with its unit of measure: `potential_mV`."""
         return self.name if self.unit in (None, "1") else f"{self.name}_{str(self.unit).replace('/', '_per_')}"
+
+
+class Ports(dict[str, Port]):
+    """Ports by name. The element of an array, `u[2]`, is found by its name as well, but is none of the ports."""
+
+    def place(self, name: str) -> tuple[Port, int] | None:
+        """The array that has the element `name`, and the place of that in row-major order; None if none has."""
+        match = INDEXED.match(name)
+        port = None if match is None else self.get(match[1])
+        if match is None or port is None:
+            return None
+        indices = tuple(int(index) - port.base for index in match[2].split(","))
+        if len(indices) != len(port.shape) or not all(
+            0 <= index < count for index, count in zip(indices, port.shape, strict=True)
+        ):
+            return None
+        return port, int(np.ravel_multi_index(indices, port.shape))
+
+    def __missing__(self, name: str) -> Port:
+        found = self.place(name)
+        if found is None:
+            raise KeyError(name)
+        return replace(found[0], name=name, shape=(), location=None, record="value", of=None)
+
+    def known(self, name: str) -> bool:
+        """Whether there is a port, or an element of one, of this name."""
+        return name in self or self.place(name) is not None
+
+    def chosen(self, patterns: Iterable[str], what: str) -> "Ports":
+        """The ports, and elements of them, that `patterns` choose: names, or with `*` and `?` for any characters.
+
+        InputError for a pattern that chooses nothing of `what`.
+        """
+        found = Ports()
+        for pattern in patterns:
+            if self.known(pattern):
+                found[pattern] = self[pattern]
+                continue
+            # A bracket is one, and does not begin a set of characters.
+            names = [name for name in self if fnmatchcase(name, pattern.replace("[", "[[]"))]
+            if not names:
+                raise InputError(f"output.variables: {what} has no variable '{pattern}'{did_you_mean(pattern, self)}")
+            found.update((name, self[name]) for name in names)
+        return found
+
+    def element(self, name: str, whole: Callable[[str], Values]) -> Values:
+        """The value of the element `name`, out of the `whole` array."""
+        found = self.place(name)
+        if found is None:
+            raise KeyError(name)
+        return np.asarray(whole(found[0].name).reshape(-1)[found[1]])
+
+    def with_element(self, name: str, value: Values, whole: Callable[[str], Values]) -> tuple[str, Values]:
+        """The array that has the element `name`, and what it is with that `value` in place of what it has."""
+        found = self.place(name)
+        if found is None:
+            raise KeyError(name)
+        values = np.array(whole(found[0].name))
+        values.reshape(-1)[found[1]] = value
+        return found[0].name, values
 
 
 @dataclass(frozen=True)
@@ -72,11 +166,16 @@ Wait = Callable[[], float | None]
 
 
 class Participant(Protocol):
-    """One unit in the coupled time loop. All calls raise ParticipantError, InputError for what the person gave."""
+    """One unit in the coupled time loop. All calls raise ParticipantError, InputError for what the person gave.
+
+    An element of an array is set, ramped and got like a scalar, by its own name. `observed` are variables of any kind
+    that were asked for to be recorded, in addition to inputs and outputs; `get` gives their values too.
+    """
 
     name: str
-    inputs: dict[str, Port]
-    outputs: dict[str, Port]
+    inputs: Ports
+    outputs: Ports
+    observed: Ports
     abilities: Abilities
 
     def begin(self) -> None:
@@ -92,7 +191,10 @@ class Participant(Protocol):
         """Let an input run over the next step, if the participant ramps; replaces `set` for that step."""
 
     def get(self, name: str) -> Values:
-        """An output's values, of the port's shape; the array is the caller's."""
+        """An output's values, of the port's shape; the array is the caller's.
+
+        Real numbers come as float64, whole ones as int64 or uint64, Booleans as bool, texts as NumPy's.
+        """
 
     def start(self, time: float, size: float) -> Wait:
         """Start to advance from `time` by `size`, both in s; nothing else may be called before the wait is over."""
@@ -111,6 +213,9 @@ class Participant(Protocol):
 
     def unpack(self, data: bytes) -> None:
         """Go to the state that `pack` gave, perhaps in another process."""
+
+    def log_to(self, path: Path) -> None:
+        """Write what it logs to the end of the file at `path` from now on, and what it has logged so far."""
 
     def close(self) -> None:
         """Terminate and release everything; never raises."""

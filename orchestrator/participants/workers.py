@@ -8,6 +8,7 @@ import os
 import signal
 from contextlib import suppress
 from itertools import cycle
+from pathlib import Path
 from time import perf_counter
 from types import TracebackType
 from typing import Any
@@ -16,7 +17,7 @@ from distributed import Client, LocalCluster
 from distributed.actor import ActorFuture
 
 from ..errors import InputError, ParticipantError, ParticipantLost
-from .participant import Abilities, Participant, Port, Ramp, Values, Wait
+from .participant import Abilities, Participant, Ports, Ramp, Values, Wait
 from .recipe import Recipe
 
 #: How long to wait for a scheduler, or for an actor to be set up, in seconds.
@@ -39,7 +40,7 @@ class Workers:
                     n_workers=count,
                     threads_per_worker=1,
                     processes=where == "processes",
-                    dashboard_address=":0",
+                    dashboard_address="127.0.0.1:0",
                     silence_logs=40,
                     memory_limit=0,
                 )
@@ -91,9 +92,9 @@ class _Host:
         self._states: dict[int, Any] = {}
         self._saved = 0
 
-    def describe(self) -> tuple[dict[str, Port], dict[str, Port], Abilities]:
+    def describe(self) -> tuple[Ports, Ports, Ports, Abilities]:
         participant = self._participant
-        return participant.inputs, participant.outputs, participant.abilities
+        return participant.inputs, participant.outputs, participant.observed, participant.abilities
 
     def call(self, name: str, *arguments: Any) -> Any:
         return getattr(self._participant, name)(*arguments)
@@ -122,7 +123,7 @@ class RemoteParticipant:
         self.name = name
         self._actor = actor
         self._limit_s = limit_s
-        self.inputs, self.outputs, self.abilities = self._result(actor.describe())
+        self.inputs, self.outputs, self.observed, self.abilities = self._result(actor.describe())
 
     def begin(self) -> None:
         """See Participant."""
@@ -170,6 +171,10 @@ class RemoteParticipant:
     def unpack(self, data: bytes) -> None:
         """See Participant."""
         self._call("unpack", data)
+
+    def log_to(self, path: Path) -> None:
+        """See Participant; the file is on the worker's machine."""
+        self._call("log_to", path)
 
     def close(self) -> None:
         """See Participant."""

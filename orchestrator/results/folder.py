@@ -16,7 +16,7 @@ from ..writing import allowed, remove_stale, writing
 from .checkpoint import Memories, read_checkpoint
 from .hdf5 import DamagedFile
 from .lock import FolderLock
-from .names import CHECKPOINT, COUPLING, FIELDS, GROWING, ITERATIONS, PARTS, SUMMARY, TIME_SERIES, WHOLE, XDMF
+from .names import CHECKPOINT, COUPLING, FIELDS, FMU_LOG, GROWING, ITERATIONS, PARTS, SUMMARY, TIME_SERIES, WHOLE, XDMF
 from .origin import Origin
 from .recording import Recording
 from .summary import is_summary
@@ -118,6 +118,7 @@ class ResultsFolder:
         remove_stale(self.path / SUMMARY)
         if before is None:
             remove_stale(self.path / CHECKPOINT)
+            remove_stale(self.path / FMU_LOG)
         if not assembly.converged:
             remove_stale(self.path / ITERATIONS)
         if assembly.mesh is None:

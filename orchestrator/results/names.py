@@ -7,6 +7,8 @@ PROFILE = "profile.json"
 FIELDS = "fields.h5"
 XDMF = "fields.xdmf"
 SUMMARY = "summary.json"
+#: Only where an FMU logs something.
+FMU_LOG = "fmu.log"
 
 #: Only while a run goes on, or to go on from.
 PARTS = "fields.parts"

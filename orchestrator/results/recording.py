@@ -17,7 +17,7 @@ from .checkpoint import Checkpoint, Memories
 from .coupling_log import CouplingLog
 from .fields import Fields
 from .iteration_log import IterationLog
-from .names import COUPLING, ITERATIONS, PARTS, SUMMARY, TIME_SERIES
+from .names import COUPLING, FMU_LOG, ITERATIONS, PARTS, SUMMARY, TIME_SERIES
 from .origin import Origin
 from .parts import check_parts
 from .profile import Profile
@@ -90,6 +90,8 @@ class Recording:
             self._profile = opened.enter_context(closing(Profile(folder, list(participants))))
             self._wall = wall(kept.get("wall"))
             opened.pop_all()
+        for participant in participants.values():
+            participant.log_to((folder / FMU_LOG).absolute())
         self._recorders = recorders
         memories = {"master": master.memory, "wall": self._wall.memory}
         memories |= {name: recorder.memory for name, recorder in recorders.items()}

@@ -59,6 +59,8 @@ def write_summary(
     }
     ejected = {}
     for column in series.columns[1:]:
+        if column in series.texts:
+            continue
         _, values = _columns(known(column))
         # An output of a foreign FMU may have the name of one of the summary's own keys, which wins.
         if values and not column.startswith("potential_") and column not in content:

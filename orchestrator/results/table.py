@@ -23,10 +23,9 @@ class Table:
         if resumed is None:
             self._file.append(_line(columns))
 
-    def add(self, row: Sequence[float | int | None]) -> None:
+    def add(self, row: Sequence[float | int | str | None]) -> None:
         """Append a row and hand it to the operating system."""
-        # `item` makes plain numbers of NumPy's, whose repr is no number.
-        self._file.append(_line(["" if value is None else repr(np.asarray(value).item()) for value in row]))
+        self._file.append(_line([_cell(value) for value in row]))
 
     def rows(self) -> list[list[str]]:
         """The cells of all rows."""
@@ -45,3 +44,10 @@ def _line(cells: Sequence[str]) -> bytes:
     text = io.StringIO(newline="")
     csv.writer(text).writerow(cells)
     return text.getvalue().encode()
+
+
+def _cell(value: float | int | str | None) -> str:
+    if value is None or isinstance(value, str):
+        return value or ""
+    # `item` makes plain numbers of NumPy's, whose repr is no number.
+    return repr(np.asarray(value).item())

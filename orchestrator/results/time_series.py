@@ -1,24 +1,31 @@
 """timeseries.csv: scalars and probes after every accepted step."""
 
+from collections import Counter
 from collections.abc import Mapping
+from itertools import chain
 from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
-from ..participants.participant import Participant
+from ..participants.participant import Participant, Port, Values
+from ..participants.recorded import recorded
 from ..probes import Probes
 from .names import TIME_SERIES
 from .table import Table
 
+Cell = float | int | str
+
 
 class TimeSeries:
-    """A row for the initial state and for every accepted step; the columns follow from the outputs' `record`.
+    """A row for the initial state and for every accepted step.
 
-    Cells of units that did not step in an exchange are empty (NaN in `rows`).
+    The columns are the variables that the participants were asked to observe, or, if none was, follow from the outputs'
+    `record`. Booleans are 0 and 1. Cells of units that did not step in an exchange are empty (NaN in `rows`).
 
-    `columns` and `rows` hold what was written. `resumed` is the `memory` of an earlier run in the same folder.
+    `columns` and `rows` hold what was written; `texts` are the columns that hold no numbers. `resumed` is the `memory`
+    of an earlier run in the same folder.
     """
 
     def __init__(
@@ -29,54 +36,63 @@ class TimeSeries:
         resumed: Mapping[str, Any] | None = None,
     ) -> None:
         self._probes = probes
-        self._recorded = [
-            (unit, port)
-            for unit, participant in participants.items()
-            for port in participant.outputs.values()
-            if port.record != "nothing"
-        ]
-        # Probed fields first, then scalars, then those that are drawn from a field.
-        self._recorded.sort(key=lambda item: (item[1].record != "probes", item[1].of is not None))
+        self._recorded = recorded(participants)
         self.columns = ["time_ms"]
-        for unit, port in self._recorded:
-            names = ["time_ms", *(other.column for _, other in self._recorded)]
-            taken = names.count(port.column) > 1
-            name, suffix = port.name, port.column.removeprefix(port.name)
-            stem = f"{unit}.{name}" if taken else name
-            if port.record == "probes":
-                self.columns += [f"{stem}_{probe}{suffix}" for probe in (probes.names if probes else ())]
-            else:
-                self.columns.append(f"{stem}{suffix}")
+        self.texts: set[str] = set()
+        plain = [self._columns(port) for _, port in self._recorded]
+        times = Counter(["time_ms", *chain.from_iterable(plain)])
+        for (unit, port), own in zip(self._recorded, plain, strict=True):
+            if any(times[name] > 1 for name in own):
+                own = [f"{unit}.{name}" for name in own]
+            self.columns += own
+            if port.type == "String":
+                self.texts.update(own)
         self._table = Table(folder / TIME_SERIES, self.columns, resumed)
         # Numbers come back from their shortest decimals to the last bit.
-        self.rows = [[float(cell) if cell else nan for cell in row] for row in self._table.rows()]
+        self.rows: list[list[Cell]] = [
+            [self._cell(column, cell) for column, cell in zip(self.columns, row, strict=True)]
+            for row in self._table.rows()
+        ]
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
         """See Observer."""
-        row = [step.time_ms]
+        row: list[Cell] = [step.time_ms]
         for unit, port in self._recorded:
-            width = len(self._probes.names) if self._probes else 0
             if unit in step.waiting:
                 # Not computed at this time: an empty cell, not a value of some time before.
-                row += [nan] * (width if port.record == "probes" else 1)
-                continue
-            values = exchange.value(unit, port.name)
-            if port.record == "probes":
-                row += self._probes(values) if self._probes else []
+                row += [nan] * len(self._columns(port))
             else:
-                row.append(float(values))
+                row += self._cells(port, exchange.value(unit, port.name))
         self.rows.append(row)
-        self._table.add([None if isnan(value) else value for value in row])
+        self._table.add([None if isinstance(value, float) and isnan(value) else value for value in row])
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
         return self._table.memory()
 
     def column(self, name: str) -> list[float]:
-        """All values of a column so far."""
+        """All values of a column of numbers so far."""
         place = self.columns.index(name)
-        return [row[place] for row in self.rows]
+        return [float(row[place]) for row in self.rows]
 
     def close(self) -> None:
         """Close the file."""
         self._table.close()
+
+    def _columns(self, port: Port) -> list[str]:
+        """The columns of a port, each with its unit of measure."""
+        names = port.elements
+        if port.record == "probes":
+            names = iter([f"{port.name}_{probe}" for probe in self._probes.names] if self._probes else [])
+        return [f"{name}{port.column.removeprefix(port.name)}" for name in names]
+
+    def _cells(self, port: Port, values: Values) -> list[Cell]:
+        if port.record == "probes":
+            return [*self._probes(values)] if self._probes else []
+        cells: list[Cell] = (values.astype(int) if port.type == "Boolean" else values).ravel().tolist()
+        return cells
+
+    def _cell(self, column: str, text: str) -> Cell:
+        if column in self.texts:
+            return text
+        return float(text) if text else nan

@@ -1,46 +1,41 @@
 """A component of a system package as it is found: its element, its FMU, and what that declares."""
 
-import zipfile
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
-import fmpy
-from lxml import etree
-
-from ...fmus.layout import scalar_names
 from ..errors import InputError
-from ..participants.fmu_variables import real_fields
+from ..participants.fmu_description import Description, read_description
+from ..participants.fmu_file import FmuFile
+from ..participants.fmu_variables import fields
 from ..participants.participant import Port
+from ..quoting import shortened
 from .file import inside, named
 from .unit_conversion import Measure
 
 _FMU = "application/x-fmu-sharedlibrary"
-_OTHERS = {
-    "application/x-ssp-definition": "a system description of its own",
-    "application/x-ssp-package": "a package of its own",
-}
 
 
 class SystemComponent:
-    """The component `element` of the package unpacked in `folder`; `unit` is its name in the scenario.
+    """The component `element` in the folder `base` of the unpacked `package`; `unit` is its name in the scenario.
 
-    InputError if it is none that can be coupled: another kind of component, or no FMI 2.0 co-simulation FMU.
+    `place` are the names of the systems that it is in, and its own. InputError if it is none that can be coupled:
+    another kind of component, or no FMI 2.0 co-simulation FMU.
     """
 
-    def __init__(self, element: Any, unit: str, folder: Path) -> None:
-        self.element, self.unit, self.label = element, unit, element.get("name")
+    def __init__(self, element: Any, unit: str, place: tuple[str, ...], base: Path, package: Path) -> None:
+        self.element, self.unit, self.place = element, unit, place
+        self.base, self.package = base, package
+        self.label = shortened(".".join(place))
         kind = element.get("type", _FMU)
         if kind != _FMU:
-            raise InputError(
-                f"component '{self.label}' is {_OTHERS.get(kind, f'of the type {kind}')}; only FMUs can be coupled"
-            )
+            raise InputError(f"component '{self.label}' is of the type {shortened(kind)}; only FMUs can be coupled")
         if element.get("implementation", "any") == "ModelExchange":
             raise InputError(f"component '{self.label}' is to be run by model exchange; only co-simulation is possible")
-        self.source = unquote(element.get("source"))
-        path = inside(folder, self.source, f"the FMU of component '{self.label}'")
+        path = inside(base, element.get("source"), f"the FMU of component '{self.label}'", package)
+        #: The FMU, relative to the unpacked package.
+        self.source = path.relative_to(package).as_posix()
         self.description = _described(path, f"component '{self.label}': {self.source}")
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self.path = path
@@ -50,35 +45,28 @@ class SystemComponent:
         """The component's connectors by name."""
         return {item.get("name"): item for item in named(self.element, "ssd:Connectors/ssd:Connector")}
 
+    def bindings(self) -> Iterator[Any]:
+        """Its parameter bindings."""
+        return named(self.element, "ssd:ParameterBindings/ssd:ParameterBinding")
+
     @cached_property
     def scalars(self) -> dict[str, tuple[Port, int]]:
-        """By the name of a Real input or output, the field that it is part of, and its place in that."""
+        """By the name of an input or output, the field that it is part of, and its place in that."""
         return {
             scalar: (field.port, place)
-            for fields in real_fields(self.path, self.description.modelVariables, {})
-            for field in fields
-            for place, scalar in enumerate(scalar_names(field.port.name, field.port.shape))
+            for causality in ("input", "output")
+            for field in fields(self.description, (causality,), {}).values()
+            for place, scalar in enumerate(field.port.elements)
         }
 
     def measure(self, name: str) -> Measure | None:
         """The unit of the variable `name`, its own or that of its type, if it has one."""
-        variable = self.variables[name]
-        declared = None if variable.declaredType is None else variable.declaredType.unit
-        unit = declared if variable.unit is None else variable.unit
+        unit = self.variables[name].unit
         return None if unit is None else self.measures.get(unit, Measure(unit))
 
     def is_relative(self, name: str) -> bool:
         """Whether the variable `name` is a difference, of temperatures for instance, which has no offset."""
-        declared = self.variables[name].declaredType
-        return name in self._relative or bool(declared is not None and declared.relativeQuantity)
-
-    @cached_property
-    def _relative(self) -> set[str]:
-        # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
-        with zipfile.ZipFile(self.path) as archive, archive.open("modelDescription.xml") as text:
-            found = etree.parse(text).iterfind(".//ScalarVariable/Real[@relativeQuantity]")
-            yes = (real.getparent().get("name") for real in found if real.get("relativeQuantity") in ("true", "1"))
-            return set(yes)
+        return bool(self.variables[name].relativeQuantity)
 
     @cached_property
     def measures(self) -> dict[str, Measure]:
@@ -92,12 +80,11 @@ class SystemComponent:
             yield unit.name, Measure.of(unit.name, base and {name: getattr(base, name) for name in names})
 
 
-def _described(path: Path, what: str) -> Any:
+def _described(path: Path, what: str) -> Description:
     try:
-        description = fmpy.read_model_description(str(path), validate=False)
-    # FMPy raises plain Exceptions, and those of zip and XML readers.
-    except Exception as error:
-        raise InputError(f"{what}: FMPy cannot read it as an FMU ({error})") from None
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        raise InputError(f"{what}: not an FMI 2.0 co-simulation FMU; replace it by one")
+        description = read_description(FmuFile(path))
+    except InputError as error:
+        raise InputError(f"{what}: {error}") from None
+    if description.fmiVersion != "2.0":
+        raise InputError(f"{what}: an FMU of FMI {description.fmiVersion}; only those of FMI 2.0 are taken in packages")
     return description

@@ -15,7 +15,7 @@ from cardiac_cosim.orchestrator.coupling.master import Master
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
 from cardiac_cosim.orchestrator.coupling.timeline import Timeline
 from cardiac_cosim.orchestrator.errors import ParticipantError
-from cardiac_cosim.orchestrator.participants.participant import Abilities, Port, Ramp, Values, Wait
+from cardiac_cosim.orchestrator.participants.participant import Abilities, Port, Ports, Ramp, Values, Wait
 
 #: From the inputs, the outputs, begin and size of a step in s to the outputs at its end.
 Law = Callable[..., Mapping[str, Any]]
@@ -43,8 +43,9 @@ class Fake:
     initially: Law | None = None
 
     def __post_init__(self) -> None:
-        self.inputs = {port.name: port for port in self.inputs}
-        self.outputs = {port.name: port for port in self.outputs}
+        self.inputs = Ports({port.name: port for port in self.inputs})
+        self.outputs = Ports({port.name: port for port in self.outputs})
+        self.observed = Ports()
         self._in: dict[str, Values] = {name: np.zeros(port.shape) for name, port in self.inputs.items()}
         self._out: dict[str, Values] = {name: np.zeros(port.shape) for name, port in self.outputs.items()}
         self._ramps: dict[str, Ramp] = {}
@@ -53,7 +54,8 @@ class Fake:
 
     def _take(self, values: Mapping[str, Any]) -> None:
         for name, value in values.items():
-            self._out[name] = np.broadcast_to(np.asarray(value, float), self.outputs[name].shape)
+            given = np.asarray(value, float if self.outputs[name].is_real else None)
+            self._out[name] = np.broadcast_to(given, self.outputs[name].shape)
 
     def begin(self) -> None:
         self.calls.append((self.name, "begin"))
@@ -65,6 +67,8 @@ class Fake:
         self._initialising = False
 
     def set(self, name: str, values: Values) -> None:
+        if name not in self.inputs:
+            name, values = self.inputs.with_element(name, values, self._in.__getitem__)
         if values.shape != self.inputs[name].shape:
             raise ParticipantError(f"{name} got the shape {values.shape}")
         self.calls.append((self.name, "set", name, values.tolist()))
@@ -76,6 +80,8 @@ class Fake:
 
     def get(self, name: str) -> Values:
         self._follow()
+        if name not in self._out:
+            return self.outputs.element(name, self._out.__getitem__)
         return self._out[name].copy()
 
     def ramp(self, name: str, ramp: Ramp) -> None:
@@ -110,6 +116,9 @@ class Fake:
 
     def unpack(self, data: bytes) -> None:
         self._in, self._out = pickle.loads(data)
+
+    def log_to(self, path: Path) -> None:
+        pass
 
     def close(self) -> None:
         self.calls.append((self.name, "close"))

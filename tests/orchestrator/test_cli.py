@@ -267,8 +267,8 @@ _SETS: dict[str, tuple[list[str], list[str]]] = {
     "geometry in too large steps": (["scene={geometry: biventricle, mesh_size_mm: 1e5}"], ["scene", "mm"]),
     "geometry in too small steps": (["scene={geometry: biventricle, mesh_size_mm: 1e-5}"], ["scene", "mm"]),
     "FMU that is not there": (["units.extra={fmu: nowhere.fmu}"], ["unit 'extra'", "nowhere.fmu: no such FMU"]),
-    "FMU without a name": (["units.extra={fmu: ''}"], ["unit 'extra'", "no such FMU"]),
-    "FMU that is a scenario": (["units.extra={fmu: small.yaml}"], ["unit 'extra'", "small.yaml", "cannot read it"]),
+    "FMU without a name": (["units.extra={fmu: ''}"], ["unit 'extra'", "this folder has no modelDescription.xml"]),
+    "FMU that is a scenario": (["units.extra={fmu: small.yaml}"], ["unit 'extra'", "small.yaml", "no zip archive"]),
 }
 
 
@@ -501,30 +501,30 @@ def test_an_fmu_of_another_mesh_does_not_fit(
 @pytest.mark.parametrize(
     ("description", "words"),
     [
-        (None, ["broken.fmu", "cannot read it"]),
-        ("", ["broken.fmu", "cannot read it"]),
-        ("<not xml", ["broken.fmu", "cannot read it"]),
+        (None, ["broken.fmu", "has no modelDescription.xml"]),
+        ("", ["broken.fmu", "no well-formed XML"]),
+        ("<not xml", ["broken.fmu", "no well-formed XML"]),
         (
             '<fmiModelDescription fmiVersion="1.0" modelName="a" modelIdentifier="a" guid="x" '
             'numberOfContinuousStates="0" numberOfEventIndicators="0"><ModelVariables/><Implementation>'
             "<CoSimulation_StandAlone><Capabilities/></CoSimulation_StandAlone></Implementation></fmiModelDescription>",
-            ["broken.fmu", "not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0"],
+            ["broken.fmu", "an FMU of FMI 1.0, which is not supported"],
         ),
         (
             '<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToken="x">'
             '<ModelExchange modelIdentifier="a"/><ModelVariables/><ModelStructure/></fmiModelDescription>',
-            ["broken.fmu", "not an FMI 2.0 co-simulation FMU, nor one of FMI 3.0"],
+            ["broken.fmu", "an FMU for model exchange only"],
         ),
         (
             '<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToken="x">'
             '<CoSimulation modelIdentifier="a"/><ModelVariables/><ModelStructure/></fmiModelDescription>',
-            ["extra", "cannot be instantiated"],
+            ["extra", "no library for this platform"],
         ),
         ('<fmiModelDescription fmiVersion="2.0" modelName="a" guid="x"/>', ["broken.fmu"]),
         (
             '<fmiModelDescription fmiVersion="2.0" modelName="a" guid="x"><CoSimulation modelIdentifier="a"/>'
             "<ModelVariables/><ModelStructure/></fmiModelDescription>",
-            ["extra", "cannot be instantiated"],
+            ["extra", "no library for this platform"],
         ),
     ],
     ids=[

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cardiac_cosim.orchestrator.errors import InputError
+from cardiac_cosim.orchestrator.errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
+from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 
@@ -54,6 +55,9 @@ def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "stateless": _builder.build_body(folder / "stateless.fmu", state=False),
         "equal": _builder.build_body(folder / "equal.fmu", variable_step=False),
         "holding": _builder.build_body(folder / "holding.fmu", ramps=False),
+    } | {
+        quirk.lower(): _builder.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
+        for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES")
     }
 
 
@@ -175,3 +179,57 @@ def test_a_step_that_an_fmu_refuses_is_told_in_its_words(simulate: Any) -> None:
 
     with pytest.raises(RunError, match="unit 'first' failed in the step from 0 to 10 ms: the spring broke"):
         simulate("units.first.start.x=1e7")
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        (),
+        ("units.first.every=4", "output.every_ms=80"),
+        ("coupling.iterate={converge: {second.F: {absolute: 1e-9}}}",),
+        ("coupling.adaptive={tolerance: 0.02, min_ms: 1, max_ms: 100}",),
+    ],
+    ids=["explicit", "every", "iterated", "adaptive"],
+)
+def test_an_fmu_that_commits_a_step_only_when_nobody_goes_back_before_it_moves(simulate: Any, settings: Any) -> None:
+    plain, _ = simulate(*settings)
+    commits, _ = simulate(*settings, kinds=("commits", "commits"))
+    assert plain["firstx"][-1] != 1.0
+    assert np.array_equal(_states(plain), _states(commits))
+
+
+def test_parameters_survive_an_fmu_that_resets_them_when_the_experiment_is_set_up(simulate: Any) -> None:
+    plain, _ = simulate()
+    resets, _ = simulate(kinds=("resets", "resets"))
+    assert np.array_equal(_states(plain), _states(resets))
+
+
+@pytest.fixture
+def first(bodies: dict[str, Path]) -> Any:
+    """A body of some kind, about to step from 50 ms on."""
+    made = []
+
+    def make(kind: str) -> Any:
+        made.append(FmuParticipant("first", bodies[kind], {}, {"x": 1.0}))
+        made[-1].begin()
+        made[-1].complete()
+        return made[-1]
+
+    yield make
+    for participant in made:
+        participant.close()
+
+
+def test_an_fmu_that_asks_for_the_end_is_told_from_one_that_fails(first: Any) -> None:
+    with pytest.raises(ParticipantTerminated, match="asks for the end of the simulation") as end:
+        first("ends").start(0.05, 0.01)
+    assert end.value.time_s == 0.05
+    with pytest.raises(ParticipantError, match=r"^40 % too long$") as failure:
+        first("reasons").start(0.05, 0.01)
+    assert not isinstance(failure.value, ParticipantTerminated | ParticipantLost)
+
+
+def test_an_fmu_that_is_beyond_repair_is_lost(first: Any) -> None:
+    body = first("dies")
+    with pytest.raises(ParticipantLost, match="beyond repair"):
+        body.start(0.05, 0.01)

@@ -300,7 +300,7 @@ _WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "no connections": (SMALL + "connections:\n", ["'connections' is empty", "expected a list"]),
     "one unit as order": (_changed("step_ms: 1", "order: mechanics"), ["'coupling.order'", "expected a list"]),
     "order by number": (_changed("step_ms: 1", "order: [1]"), ["'coupling.order.0' is 1", "expected a text"]),
-    "connections in themselves": (SMALL + "connections: &a [*a]\n", ["'connections.0'", "expected a text"]),
+    "connections in themselves": (SMALL + "connections: &a [*a]\n", ["line 9", "'&a' contains itself"]),
 }
 
 
@@ -418,7 +418,7 @@ def test_a_wrong_set_is_repeated_in_the_message_with_the_remedy(
     with pytest.raises(InputError) as caught:
         _load(tmp_path, SMALL, assignment)
     message = str(caught.value)
-    for word in (f"--set {assignment}:", *words):
+    for word in (f"--set {' '.join(assignment.splitlines())}:", *words):
         assert word in message
 
 

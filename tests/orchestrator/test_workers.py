@@ -75,6 +75,7 @@ def asleep() -> type[Recipe]:
             self._seconds = seconds
             self.inputs: dict[str, Any] = {}
             self.outputs: dict[str, Any] = {}
+            self.observed: dict[str, Any] = {}
             self.abilities = None
 
         def start(self, begin: float, size: float) -> Any:

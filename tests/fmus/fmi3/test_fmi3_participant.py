@@ -251,13 +251,14 @@ def test_the_cache_keeps_both_versions_apart(tiny: Mesh, tmp_path: Path, monkeyp
 def test_arrays_scalars_and_a_structural_dimension(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
     participant = _ready(join(foreign["Arrays"]))
     assert participant.inputs == {
-        "x": Port("x", None, (2, 3), None, record="nothing"),
+        "x": Port("x", None, (2, 3), None, record="value"),
         "u": Port("u", None, (), "global", record="value"),
     }
-    # A dimension that a structural parameter gives has its start value. Integers are not exchanged.
+    # A dimension that a structural parameter gives has its start value.
     assert participant.outputs == {
-        "y": Port("y", None, (4,), None, record="nothing"),
+        "y": Port("y", None, (4,), None, record="value"),
         "total": Port("total", None, (), "global", record="value"),
+        "number": Port("number", None, (), "global", record="value", type="Int32", discrete=True),
     }
     # As its description says, where pythonfmu3 leaves the step size fixed unless told otherwise.
     assert participant.abilities == Abilities(rolls_back=True, serializes=True, any_step_size=False)

@@ -3,7 +3,18 @@
  *     m x'' + (c + c_c) x' + (k + k_c) x = F + k_c x_in + c_c v_in
  *
  * Integrated exactly for inputs that are polynomials of up to second degree over a step (input derivatives).
- * The variables, by value reference: 0 m, 1 k, 2 c, 3 k_c, 4 c_c; 5 F, 6 x_in, 7 v_in; 8 x, 9 v; 10 force. */
+ *
+ * Built with QUIRK as one of these numbers it takes the liberties that foreign FMUs take: */
+#define COMMITS 1   /* what a step computed is kept only when it is told that nobody goes back before its begin */
+#define RESETS 2    /* fmi2SetupExperiment gives every variable its default */
+#define ENDS 3      /* asks for the end of the simulation from 50 ms on */
+#define DIES 4      /* fmi2Fatal from 50 ms on */
+#define REASONS 5   /* discards a step from 50 ms on and says why, as a message of that status */
+#define LINES 6     /* takes first derivatives of inputs only */
+#ifndef QUIRK
+#define QUIRK 0
+#endif
+/* The variables, by value reference: 0 m, 1 k, 2 c, 3 k_c, 4 c_c; 5 F, 6 x_in, 7 v_in; 8 x, 9 v; 10 force. */
 #include "fmi2Functions.h"
 #include <math.h>
 #include <stdlib.h>
@@ -19,7 +30,8 @@ typedef struct {
 } State;
 
 typedef struct {
-    State state;
+    State state, committed;
+    double reached;
     fmi2CallbackFunctions callbacks;
     char name[64];
 } Body;
@@ -86,11 +98,16 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 void fmi2FreeInstance(fmi2Component c) { free(c); }
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String k[]) { return fmi2OK; }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean t, fmi2Real tol, fmi2Real b, fmi2Boolean s, fmi2Real e) {
+    if (QUIRK == RESETS) {
+        memset(&((Body *)c)->state, 0, sizeof(State));
+        ((Body *)c)->state.values[M] = 1.0;
+    }
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     update_force(&((Body *)c)->state);
+    ((Body *)c)->committed = ((Body *)c)->state;
     return fmi2OK;
 }
 fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
@@ -120,6 +137,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     for (size_t i = 0; i < n; i++) {
         if (vr[i] < FIRST_INPUT || vr[i] >= FIRST_INPUT + INPUTS || order[i] < 1 || order[i] > 2)
             return fail(c, "no such input derivative");
+        if (QUIRK == LINES && order[i] > 1) return fail(c, "no second derivatives");
         (order[i] == 1 ? s->slopes : s->curvatures)[vr[i] - FIRST_INPUT] = value[i];
     }
     return fmi2OK;
@@ -127,6 +145,21 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no_undo) {
     State *s = &((Body *)c)->state;
+    if (QUIRK == COMMITS) {
+        memcpy(((Body *)c)->committed.values + FIRST_INPUT, s->values + FIRST_INPUT, INPUTS * sizeof(double));
+        if (no_undo) ((Body *)c)->committed = *s;
+        else *s = ((Body *)c)->committed;
+    }
+    ((Body *)c)->reached = time;
+    if (time > 0.0499) {
+        if (QUIRK == ENDS) return fmi2Discard;
+        if (QUIRK == DIES) { fail(c, "beyond repair"); return fmi2Fatal; }
+        if (QUIRK == REASONS) {
+            ((Body *)c)->callbacks.logger(((Body *)c)->callbacks.componentEnvironment, ((Body *)c)->name, fmi2Discard,
+                                          "logStatusDiscard", "%d %% too long", 40);
+            return fmi2Discard;
+        }
+    }
     const double *v = s->values;
     double a[N][N] = {{0}}, e[N][N], z[N] = {v[X], v[V], load(s, v + F), load(s, s->slopes), load(s, s->curvatures)};
     a[0][1] = 1.0;
@@ -201,7 +234,14 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference k[], size_t m, const fmi2Real d[], fmi2Real x[]) NOTHING
 fmi2Status fmi2CancelStep(fmi2Component c) NOTHING
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind k, fmi2Status *x) NOTHING
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k, fmi2Real *x) NOTHING
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k, fmi2Real *x) {
+    *x = ((Body *)c)->reached;
+    return fmi2OK;
+}
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind k, fmi2Integer *x) NOTHING
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind k, fmi2Boolean *x) NOTHING
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind k, fmi2Boolean *x) {
+    if (QUIRK != ENDS) return fail(c, "not known");
+    *x = k == fmi2Terminated;
+    return fmi2OK;
+}
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind k, fmi2String *x) NOTHING

@@ -24,14 +24,16 @@ def compiler() -> str | None:
     return shutil.which("cc") or shutil.which("gcc")
 
 
-def build_body(path: Path, state: bool = True, variable_step: bool = True, ramps: bool = True) -> Path:
-    """Write the FMU to `path`, with or without what an FMU need not be able to do."""
+def build_body(
+    path: Path, state: bool = True, variable_step: bool = True, ramps: bool = True, quirk: str = "0"
+) -> Path:
+    """Write the FMU to `path`, with or without what an FMU need not be able to do; `quirk` is a name in body.c."""
     folder = path.parent / f"{path.stem}-build"
     folder.mkdir()
     library = folder / f"body{sysconfig.get_config_var('SHLIB_SUFFIX') or '.so'}"
     headers = Path(fmpy.__file__).parent / "c-code"
     command = [str(compiler()), "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-I{headers}", f'-DGUID="{_GUID}"']
-    command += ["-DWITH_STATE"] if state else []
+    command += [f"-DQUIRK={quirk}", *(["-DWITH_STATE"] if state else [])]
     source = Path(__file__).with_name("body.c")
     subprocess.run([*command, str(source), "-o", str(library), "-lm"], check=True)
     with zipfile.ZipFile(path, "w") as archive:
