@@ -140,7 +140,9 @@ def _target(column: str, participants: Mapping[str, Participant], fed: set[tuple
             f"column '{column}': the input {unit}.{name} is connected, or driven by another column; remove one of the "
             "two (`connect_by_name: false` connects nothing but what is written)"
         )
-    known = [f"{unit}.{name}" for unit, participant in participants.items() for name in participant.inputs]
+    known = {f"{unit}.{name}" for unit, participant in participants.items() for name in participant.inputs}
+    if not unit or unit not in participants:
+        known |= {name for participant in participants.values() for name in participant.inputs}
     raise InputError(f"column '{column}' is no input{did_you_mean(column, known)}")
 
 
