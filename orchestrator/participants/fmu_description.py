@@ -104,7 +104,7 @@ def read_description(file: FmuFile) -> Description:
         # FMPy raises plain Exceptions.
         except Exception as error:
             raise InputError(f"FMPy cannot read it as an FMU ({error or type(error).__name__})") from None
-    _check(variables)
+        _check(variables)
     own = _own(root)
     unit = None if own is None else own.find("Unit")
     return Description(
@@ -205,18 +205,21 @@ def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
 
 
 def _check(variables: Sequence[Variable]) -> None:
-    """InputError for names that are not unique, and for value references that no FMU can have."""
-    if len({variable.name for variable in variables}) != len(variables):
+    """InputError for names that are not unique, and for value references and dimensions that no FMU can have."""
+    names = {variable.name for variable in variables}
+    if len(names) != len(variables):
         seen: set[str] = set()
         for variable in variables:
             if variable.name in seen:
                 raise InputError(f"two of its variables are named '{variable.name}'; export it with names of their own")
             seen.add(variable.name)
+    if None in names or "" in names:
+        raise InputError("one of its variables has no name")
+    references = [variable.valueReference for variable in variables]
+    if references and not 0 <= min(references) <= max(references) < _REFERENCES:
+        wrong = next(variable for variable in variables if not 0 <= variable.valueReference < _REFERENCES)
+        raise InputError(f"its variable '{wrong.name}' has no valid value reference: {wrong.valueReference}")
     for variable in variables:
-        if not variable.name:
-            raise InputError("one of its variables has no name")
-        if not 0 <= variable.valueReference < _REFERENCES:
-            raise InputError(f"its variable '{variable.name}' has no valid value reference: {variable.valueReference}")
         if variable.shape and (min(variable.shape) < 0 or prod(variable.shape) > _MOST_ELEMENTS):
             raise InputError(
                 f"its variable '{variable.name}' has the shape {variable.shape}; dimensions are counts, and more than "
