@@ -25,6 +25,10 @@ class RunError(Exception):
     sweeps: "Sweeps | None" = None
 
 
+class Terminated(RunError):
+    """A unit asked for the end of the simulation before its time."""
+
+
 class Interrupted(Exception):
     """Somebody asked the run to stop by the signal of number `signal`; the results so far are complete."""
 
@@ -43,7 +47,7 @@ class ParticipantError(Exception):
 
 
 class ParticipantLost(ParticipantError):
-    """A participant is gone for good: its process died, or it did not come back in time."""
+    """A participant is gone for good: its process died, it did not come back in time, or FMI forbids further calls."""
 
 
 class ParticipantTerminated(ParticipantError):
@@ -53,7 +57,14 @@ class ParticipantTerminated(ParticipantError):
 
 
 class NotConverged(Exception):
-    """The iteration of a loop found no solution of the step; the master adds when it was."""
+    """The iteration of a loop found no solution of the step; the master adds when it was.
+
+    `sweeps` is the history of the step's loops, this one included.
+    """
+
+    def __init__(self, message: str, sweeps: "Sweeps") -> None:
+        super().__init__(message)
+        self.sweeps = sweeps
 
 
 #: Characters of a name, and known names, that a hint repeats.

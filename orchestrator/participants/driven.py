@@ -29,11 +29,11 @@ class Driven:
     def begin(self) -> None:
         """See Participant."""
         self._participant.begin()
+        for name, signal in self.signals.items():
+            self._participant.set(name, signal.at(0.0, 0.0))
 
     def complete(self) -> None:
         """See Participant."""
-        for name, signal in self.signals.items():
-            self._participant.set(name, signal.at(0.0, 0.0))
         self._participant.complete()
 
     def set(self, name: str, values: Values) -> None:
