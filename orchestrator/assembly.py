@@ -11,25 +11,30 @@ from .coupling.master import Master
 from .errors import InputError, ParticipantError, RunError
 from .fmu_folder import FmuFolder
 from .participants.driven import drive
-from .participants.native import Mesh, check_unit, scene_mesh
+from .participants.native import Mesh, check_mesh, check_unit, scene_mesh
 from .participants.participant import Participant
 from .participants.recipe import Recipe
 from .probes import Probes
 from .results.time_series import recorded
 from .scenario import Scenario, UnitEntry
+from .scene_warnings import scene_warnings
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """What a scenario asks for, put together; `converged` are the fields ("unit.field") that have a criterion."""
+    """What a scenario asks for, put together; `warnings` tell what is unusual of it.
+
+    `converged` says of each field ("unit.field") that has to converge in an iterated step by which criterion.
+    """
 
     scenario: Scenario
     mesh: Mesh | None
     probes: Probes | None
     participants: Mapping[str, Participant]
     connections: Sequence[Connection]
-    converged: Sequence[str]
+    converged: Mapping[str, str]
     master: Master
+    warnings: Sequence[str]
 
 
 def assemble(
@@ -55,7 +60,9 @@ def assemble(
     recorded(participants)
     scheme, converged = build_scheme(scenario.coupling, participants, connections)
     master = build_master(scenario, participants, connections, scheme)
-    return Assembly(scenario, mesh, probes, participants, connections, converged, master)
+    return Assembly(
+        scenario, mesh, probes, participants, connections, converged, master, scene_warnings(scenario, mesh)
+    )
 
 
 def called_directly(scenario: Scenario) -> Scenario:
@@ -73,7 +80,10 @@ def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
     if scenario.scene is None:
         return None
     with _naming("scene"):
-        return scene_mesh(scenario.scene, base)
+        mesh = scene_mesh(scenario.scene, base)
+        units = [entry.unit for entry in scenario.units.values() if entry.unit is not None]
+        check_mesh(mesh, scenario.scene, base, units)
+    return mesh
 
 
 def make_participants(

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from .errors import InputError, Interrupted, RunError
 from .scenario import Scenario, load_scenario
+from .supervision import watch
 
 #: Exit codes; 1 is left for what should not happen, an exception nobody expected.
 INPUT_WRONG = 2
@@ -145,17 +146,29 @@ def _report(scenario: Scenario, folder: Path, summary: dict[str, Any]) -> None:
         )
     lines.append(f"  results in {folder}")
     typer.echo("\n".join(lines))
-    late = summary["unconverged_ms"]
+    late, missed = summary["unconverged_ms"], summary["tolerance_missed"]
     if late:
-        typer.echo(
-            f"warning: {len(late)} of {summary['steps']} steps were accepted without having converged, the first at "
-            f"{late[0]:g} ms; see the residuals in {folder / 'coupling.csv'}",
-            err=True,
+        _warn(
+            f"{len(late)} of {summary['steps']} steps were accepted without having converged, the first at "
+            f"{late[0]:g} ms; see the residuals in {folder / 'coupling.csv'}"
+        )
+    if missed["steps"]:
+        _warn(
+            f"{missed['steps']} of {summary['steps']} steps missed the tolerance of coupling.adaptive, because none is "
+            f"shorter than min_ms, the first at {missed['first_ms']:g} ms; see the column `error` in "
+            f"{folder / 'coupling.csv'}, and lower `min_ms` or raise `tolerance`"
         )
 
 
+def _warn(text: str) -> None:
+    typer.echo(f"warning: {text}", err=True)
+
+
 def main() -> None:
-    """Entry point: exit code 0 done, 2 the input is wrong, 3 the run failed, 128 + signal when stopped; 1 is a bug."""
+    """The command, in this process.
+
+    Exit code 0: done; 2: the input is wrong; 3: the run failed; 128 + signal: stopped; 1: a bug.
+    """
     try:
         app()
     except InputError as error:
@@ -166,5 +179,10 @@ def main() -> None:
         sys.exit(RUN_FAILED)
 
 
+def supervised_main() -> None:
+    """The same, watched by a process that knows if foreign code ended it (`supervision`)."""
+    watch(main)
+
+
 if __name__ == "__main__":
-    main()
+    supervised_main()

@@ -1,4 +1,4 @@
-"""The ways a run ends early, and the hint that goes with a misspelt name."""
+"""The ways a run ends early, and what their messages are made of."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .coupling.schemes import Sweeps
-
-from .untrusted.quoting import shortened
 
 
 class InputError(Exception):
@@ -23,6 +21,10 @@ class RunError(Exception):
 
     time_ms: float | None = None
     sweeps: "Sweeps | None" = None
+
+
+class Terminated(RunError):
+    """A unit asked for the end of the simulation before its time."""
 
 
 class Interrupted(Exception):
@@ -43,7 +45,7 @@ class ParticipantError(Exception):
 
 
 class ParticipantLost(ParticipantError):
-    """A participant is gone for good: its process died, or it did not come back in time."""
+    """A participant is gone for good: its process died, it did not come back in time, or FMI forbids further calls."""
 
 
 class ParticipantTerminated(ParticipantError):
@@ -53,7 +55,24 @@ class ParticipantTerminated(ParticipantError):
 
 
 class NotConverged(Exception):
-    """The iteration of a loop found no solution of the step; the master adds when it was."""
+    """The iteration of a loop found no solution of the step; the master adds when it was.
+
+    `sweeps` is the history of the step's loops, this one included.
+    """
+
+    def __init__(self, message: str, sweeps: "Sweeps") -> None:
+        super().__init__(message)
+        self.sweeps = sweeps
+
+
+#: Characters of a value that a message repeats.
+_SHORT = 80
+
+
+def shortened(text: str, longest: int = _SHORT) -> str:
+    """`text` as messages repeat it: on one line, without control characters, and cut where it becomes too long."""
+    plain = "".join(letter if letter.isprintable() else " " for letter in text[: longest + 1])
+    return plain if len(text) <= longest else f"{plain[:longest]}..."
 
 
 #: Characters of a name, and known names, that a hint repeats.

@@ -77,6 +77,8 @@ def _run(
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
         assembly = assemble(stack, scenario, base, mesh, fmu_dir)
+        for text in assembly.warnings:
+            console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
         master = assembly.master
         ready = time.perf_counter()
         unready = None
@@ -123,4 +125,4 @@ def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -
     mesh = checked_mesh(scenario, base)
     with ExitStack() as stack:
         assembly = assemble(stack, called_directly(scenario), base, mesh, fmu_dir, described=True)
-        return describe(scenario, mesh, assembly.participants, assembly.connections)
+        return describe(assembly)

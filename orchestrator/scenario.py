@@ -89,12 +89,46 @@ class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
+def _groups(value: Any) -> list[str | int]:
+    groups = value if isinstance(value, list) else [value]
+    if not groups or not all(isinstance(group, str | int) and not isinstance(group, bool) for group in groups):
+        raise ValueError("expected the name or the number of a group of triangles in the mesh file, or a list of such")
+    if any(isinstance(group, int) and abs(group) >= 2**53 for group in groups):
+        raise ValueError("expected numbers of groups as a mesh file has them, not one with so many digits")
+    return groups
+
+
+def _scale(value: Any) -> Any:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if (
+        value is not None
+        and not (isinstance(value, str) and value in _LENGTHS_MM)
+        and not (number and _SCALES[0] <= value <= _SCALES[1])
+    ):
+        raise ValueError(
+            f"expected a unit of length, {', '.join(_LENGTHS_MM)}, or a number from {_SCALES[0]:g} to {_SCALES[1]:g} "
+            "that makes mm of the file's coordinates"
+        )
+    return value
+
+
+#: The units of length that coordinates in a file may be in, in mm, and the factors that may stand in their place.
+_LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
+_SCALES = (1e-6, 1e6)
+
+
 class Scene(_Section):
-    """The anatomy: a named geometry at a mesh size, or a mesh file."""
+    """The anatomy: a named geometry at a mesh size, or a mesh file.
+
+    `boundaries` says which groups of the file, by name or number, make up a boundary; `scale` is the unit of length of
+    its coordinates, or a factor.
+    """
 
     geometry: str | None = None
     mesh: FilePath | None = None
     mesh_size_mm: Positive = 5.0
+    boundaries: dict[str, Annotated[Any, AfterValidator(_groups)]] = Field(default_factory=dict)
+    scale: Annotated[Any, AfterValidator(_scale)] = None
 
     @model_validator(mode="after")
     def _one_of(self) -> "Scene":
@@ -102,7 +136,14 @@ class Scene(_Section):
             raise ValueError("give either `geometry` (with `mesh_size_mm`) or `mesh`, a mesh file")
         if self.mesh is not None and "mesh_size_mm" in self.model_fields_set:
             raise ValueError("`mesh_size_mm` has no meaning with `mesh`; remove it")
+        if self.mesh is None and (self.boundaries or self.scale is not None):
+            raise ValueError("`boundaries` and `scale` are for the content of a `mesh` file; remove them")
         return self
+
+    @property
+    def unit_mm(self) -> float:
+        """What the coordinates in the mesh file are multiplied by."""
+        return float(_LENGTHS_MM.get(self.scale or "mm", self.scale))
 
 
 class UnitEntry(_Section):
@@ -352,8 +393,8 @@ class Scenario(_Section):
     def resolved(self) -> dict[str, Any]:
         """The scenario with every default written out; it can be loaded again."""
         without: dict[str, set[str]] = {}
-        if self.scene is not None and self.scene.mesh is not None:
-            without["scene"] = {"mesh_size_mm"}
+        if self.scene is not None:
+            without["scene"] = {"mesh_size_mm"} if self.scene.mesh is not None else {"boundaries", "scale"}
         content = self.model_dump(exclude=without or None, by_alias=True)
         if self.scene is None:
             del content["scene"]

@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence, Set
 from math import ceil
 
-import networkx as nx
 import numpy as np
 
+from .assembly import Assembly
 from .coupling.build import idle
 from .coupling.connections import Connection
+from .coupling.loops import groups_in_order
 from .coupling.master import stepping_order
 from .participants.driven import Driven
 from .participants.native import Mesh, element_quality
@@ -22,13 +23,10 @@ _UPSTROKE_MS = 15.0
 _ELEMENTS = {0: "points", 1: "lines", 2: "triangles", 3: "tetrahedra"}
 
 
-def describe(
-    scenario: Scenario,
-    mesh: Mesh | None,
-    participants: Mapping[str, Participant],
-    connections: Sequence[Connection],
-) -> str:
+def describe(assembly: Assembly) -> str:
     """The text for a person: mesh, units, connections, loops, order, exchange, what is not modelled, warnings."""
+    scenario, mesh, participants = assembly.scenario, assembly.mesh, assembly.participants
+    connections = assembly.connections
     order = stepping_order(participants, scenario.coupling.order)
     parts = {
         "mesh": [] if mesh is None else list(_mesh(mesh)),
@@ -37,9 +35,13 @@ def describe(
         "signals": list(_driven(scenario, participants)),
         "loops": _loops(order, connections) or ["none: one ordered sweep is exact, there is nothing to iterate"],
         "order": [" -> ".join(order)],
-        "exchange": list(_exchange(scenario, participants, connections, order)),
+        "convergence": [f"{name}: {criterion}" for name, criterion in assembly.converged.items()],
+        "exchange": [
+            *_exchange(scenario, participants, connections, order),
+            *_held(scenario, participants, connections, order),
+        ],
         "not modelled": list(_absent(participants, connections)) or ["nothing is left out"],
-        "warnings": list(_warnings(scenario, mesh)) or ["none"],
+        "warnings": [*assembly.warnings, *_warnings(scenario, mesh)] or ["none"],
     }
     lines = [scenario.name]
     for title, content in parts.items():
@@ -71,15 +73,26 @@ def _units(scenario: Scenario, participants: Mapping[str, Participant]) -> Itera
 
 
 def _loops(order: Sequence[str], connections: Sequence[Connection]) -> list[str]:
-    graph = nx.DiGraph()
-    graph.add_nodes_from(order)
-    graph.add_edges_from(
-        (link.source.unit, link.target.unit)
-        for link in connections
-        if link.source.unit in order and link.target.unit in order
-    )
-    found = [members for members in nx.strongly_connected_components(graph) if len(members) > 1]
-    return [" <-> ".join(sorted(members, key=order.index)) for members in found]
+    return [" <-> ".join(group.units) for group in groups_in_order(order, connections) if len(group.units) > 1]
+
+
+def _held(
+    scenario: Scenario,
+    participants: Mapping[str, Participant],
+    connections: Sequence[Connection],
+    order: Sequence[str],
+) -> Iterator[str]:
+    """The inputs that are held although the scenario asks for linear ones."""
+    if scenario.coupling.interpolation != "linear":
+        return
+    for link in connections:
+        abilities = participants[link.target.unit].abilities
+        moves = link.target.unit in order and not _fixed(link, participants)
+        if moves and not abilities.ramps and not abilities.memoryless:
+            yield (
+                f"{link.target}: held over every step, although `interpolation: linear` is asked for, because the unit "
+                "cannot follow an input inside a step; the coupling is of first order there"
+            )
 
 
 def _exchange(

@@ -67,4 +67,7 @@ def beyond_the_standard(scenario: Scenario) -> str:
     kept["every"] = {name: entry.every for name, entry in scenario.units.items() if entry.every != 1}
     if scenario.scene is not None:
         kept["scene"] = {"mesh": f"extra/{MESH}"}
+        if scenario.scene.scale is not None:
+            # What is packed is in mm, and as sure of it.
+            kept["scene"]["scale"] = "mm"
     return json.dumps(kept)

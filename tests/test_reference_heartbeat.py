@@ -13,8 +13,9 @@ from cardiac_cosim.units.mesh.file import read_mesh
 _DATA = Path(__file__).parent / "data"
 _SCENARIO = Path(__file__).parent.parent / "scenarios" / "baseline.yaml"
 
-#: Activation of the reference at the probes in ms (see data/README.md for where it comes from).
-_ACTIVATION = {"base": 4.91, "middle": 68.52, "apex": 102.83}
+#: Activation of the reference at the probes in ms (see data/README.md for where it comes from), and what is allowed:
+#: twice the differences that the README shows.
+_ACTIVATION = {"base": (4.91, 1.4), "middle": (68.52, 3.2), "apex": (102.83, 1.0)}
 
 
 @pytest.fixture(scope="module")
@@ -24,11 +25,14 @@ def heartbeat(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 
 def test_activation_is_that_of_the_reference(heartbeat: Outcome) -> None:
-    for probe, expected in _ACTIVATION.items():
-        assert heartbeat.summary["activation_time_ms"][probe] == pytest.approx(expected, abs=3.0), probe
+    for probe, (expected, allowed) in _ACTIVATION.items():
+        assert heartbeat.summary["activation_time_ms"][probe] == pytest.approx(expected, abs=allowed), probe
 
 
-@pytest.mark.parametrize(("column", "allowed"), [("lv_volume_ml", 0.4), ("rv_volume_ml", 0.4), ("apex_uplift_mm", 0.2)])
+# Twice the differences that the README shows.
+@pytest.mark.parametrize(
+    ("column", "allowed"), [("lv_volume_ml", 0.12), ("rv_volume_ml", 0.12), ("apex_uplift_mm", 0.04)]
+)
 def test_course_is_that_of_the_reference_at_every_ten_milliseconds(
     heartbeat: Outcome, column: str, allowed: float
 ) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import Enum
 from functools import cache
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +32,14 @@ class Phase(Enum):
     INITIALIZATION = "in initialization mode"
     STEPPING = "initialized"
     TERMINATED = "terminated"
+
+
+@runtime_checkable
+class Placed(Protocol):
+    """A group of parameters that name places, which a mesh may have elsewhere."""
+
+    def warnings(self, mesh: Mesh) -> Iterator[str]:
+        """What is unusual of the places on `mesh`, in sentences for a person."""
 
 
 class Unit(ABC):
@@ -86,6 +94,20 @@ class Unit(ABC):
             return _declared(cls.groups, cls.fields)[name]
         except KeyError:
             raise InvalidInput(f"unit '{cls.name}' has no variable '{name}'") from None
+
+    # --- the mesh ----------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def check_mesh(cls, mesh: Mesh) -> None:
+        """InvalidInput if `mesh` lacks an anatomy that the unit needs; most need none."""
+        return
+
+    def warnings(self) -> Iterator[str]:
+        """What is unusual of the parameters on this mesh, in sentences for a person."""
+        for group in self.groups:
+            parameters: object = self.parameters(group)
+            if isinstance(parameters, Placed):
+                yield from parameters.warnings(self.mesh)
 
     # --- life cycle, in FMI order -------------------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """From the coupling section of a scenario to the scheme that it asks for."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 
 from ..errors import InputError, did_you_mean
 from ..participants.participant import Participant
@@ -18,11 +19,14 @@ from .timeline import Timeline
 #: Relaxation where none is given (Aitken: of a step's first sweep).
 _RELAXATION = 0.5
 
+#: What is asked of a field that a loop's sweeps start from and that no criterion names (`convergence`).
+_UNNAMED = "has no criterion: as still, relative to its magnitude, as the strictest of those given asks for"
+
 
 def build_scheme(
     coupling: Coupling, participants: Mapping[str, Participant], connections: Sequence[Connection]
-) -> tuple[Scheme, list[str]]:
-    """The scheme, and the fields ("unit.field") that it brings to convergence.
+) -> tuple[Scheme, dict[str, str]]:
+    """The scheme, and the fields ("unit.field") that have to converge in an iterated step, with their criteria.
 
     Raises
     ------
@@ -32,10 +36,10 @@ def build_scheme(
     sweep = SCHEMES[coupling.scheme]()
     settings = coupling.iterate
     if settings is None:
-        return sweep, []
+        return sweep, {}
     limits = Limits(_criteria(settings, connections), settings.max_iterations, settings.on_limit == "error")
     scheme = Iterated(sweep, participants, connections, _acceleration(settings), limits)
-    rings = [group for group, loops in scheme.groups(list(participants)) if loops]
+    rings = [group.units for group in scheme.groups(list(participants)) if group.is_loop]
     looped = [unit for ring in rings for unit in ring]
     if not looped:
         raise InputError("coupling.iterate: no units form a loop, so there is nothing to iterate; remove it")
@@ -45,16 +49,20 @@ def build_scheme(
                 f"coupling.iterate: unit '{unit}' cannot roll back (canGetAndSetFMUstate is false); "
                 "remove `iterate`, or that unit from the loop"
             )
+    fields = {ring: scheme.fields(ring) for ring in rings}
+    exchanged = [name for ring in rings for name in fields[ring]]
     for name in limits.criteria:
-        if name.split(".")[0] not in looped:
+        if name not in exchanged:
             raise InputError(f"coupling.iterate.converge: {name} is exchanged in no loop; remove it")
     for ring in rings:
-        if not any(name.split(".")[0] in ring for name in limits.criteria):
+        if not any(name in limits.criteria for name in fields[ring]):
             raise InputError(
                 f"coupling.iterate.converge: no field of the loop of {', '.join(ring)} has a criterion; "
                 "name one that they exchange"
             )
-    return scheme, list(limits.criteria)
+    judged = {name: _in_words(criterion) for name, criterion in limits.criteria.items()}
+    unnamed = [name for ring in rings for name, carried in fields[ring].items() if carried and name not in judged]
+    return scheme, judged | dict.fromkeys(unnamed, _UNNAMED)
 
 
 def build_master(
@@ -68,7 +76,7 @@ def build_master(
     else:
         limits = coupling.adaptive
         timeline = Timeline.of_shortest_step(limits.min_ms, stop, every)
-        control = AdaptiveStep(timeline, limits.tolerance, limits.min_ms, limits.max_ms, coupling.step_ms)
+        control = AdaptiveStep(timeline, limits.tolerance, limits.min_ms, limits.max_ms, coupling.step_ms, participants)
         for unit in stepping_order(participants, coupling.order):
             abilities = participants[unit].abilities
             lacks = None if abilities.rolls_back else "cannot roll back (canGetAndSetFMUstate is false)"
@@ -78,8 +86,21 @@ def build_master(
                 raise InputError(f"coupling.adaptive: unit '{unit}' {lacks}; give `step_ms` instead")
     rates = {name: entry.every for name, entry in scenario.units.items()}
     rates |= dict.fromkeys(idle(participants, connections), timeline.stop + 1)
+    _check_equal_steps(rates, participants, timeline)
     inputs = Inputs(coupling.extrapolation, coupling.interpolation == "linear", control.depth)
     return Master(participants, connections, scheme, timeline, coupling.order, inputs, control, rates)
+
+
+def _check_equal_steps(rates: Mapping[str, int], participants: Mapping[str, Participant], timeline: Timeline) -> None:
+    """InputError where a unit that takes equal steps only would be cut short by an output or by the end."""
+    for unit, rate in rates.items():
+        ticks = min(rate, timeline.every)
+        if not participants[unit].abilities.any_step_size and (timeline.every % ticks or timeline.stop % ticks):
+            raise InputError(
+                f"units.{unit}.every: it takes equal steps only (canHandleVariableCommunicationStepSize is false), "
+                f"but the unit steps at output times and at the end as well, and {rate} exchanges of "
+                f"{timeline.tick_ms:g} ms do not divide these times; change `every`, `output.every_ms` or `run.stop_ms`"
+            )
 
 
 def idle(participants: Mapping[str, Participant], connections: Sequence[Connection]) -> list[str]:
@@ -109,6 +130,11 @@ def _criteria(settings: Iterate, connections: Sequence[Connection]) -> dict[str,
             raise InputError(f"coupling.iterate.converge: '{key}' {problem}{did_you_mean(key, known)}")
         criteria[found[0]] = Criterion(limits.absolute, limits.relative, limits.residual_relative)
     return criteria
+
+
+def _in_words(criterion: Criterion) -> str:
+    limits = {measure.replace("_", "-"): limit for measure, limit in asdict(criterion).items() if limit is not None}
+    return " or ".join(f"{measure} {limit:g}" for measure, limit in limits.items())
 
 
 def _acceleration(settings: Iterate) -> Acceleration:

@@ -2,11 +2,10 @@
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from ..errors import InputError, did_you_mean
@@ -128,23 +127,6 @@ def _whole(target: End, participants: Mapping[str, Participant]) -> End:
     inputs = participants[target.unit].inputs
     place = None if target.name in inputs else inputs.place(target.name)
     return target if place is None else End(target.unit, place[0].name)
-
-
-def initial_order(units: Iterable[str], connections: Iterable[Connection]) -> list[str]:
-    """An order in which units can be initialised: each after those that feed it, as far as loops allow.
-
-    Inside a loop the given order of the units decides, and the inputs that close it start at their start values.
-    """
-    order = list(units)
-    graph = nx.DiGraph()
-    graph.add_nodes_from(order)
-    graph.add_edges_from((link.source.unit, link.target.unit) for link in connections)
-    loops = nx.condensation(graph)
-    position = {unit: number for number, unit in enumerate(order)}
-    sequence = nx.lexicographical_topological_sort(
-        loops, key=lambda loop: min(position[unit] for unit in loops.nodes[loop]["members"])
-    )
-    return [unit for loop in sequence for unit in sorted(loops.nodes[loop]["members"], key=position.__getitem__)]
 
 
 def _parse(text: str, participants: Mapping[str, Participant]) -> Connection:

@@ -1,16 +1,26 @@
-"""When a field counts as converged (measures as in preCICE).
+"""When a loop counts as converged: when every field that its sweeps start from does.
 
-With the residual r = H(x) − x: `absolute` |r| ≤ limit, `relative` |r| ≤ limit |H(x)|, `residual_relative`
-|r| ≤ limit |r of the first sweep|. All norms are Euclidean over the field's values. Of several measures given for one
-field any one is enough, so that `absolute` with `relative` is the usual pair for a field that may vanish.
+With the residual r = H(x) − x a field's criterion has the measures of preCICE: `absolute` |r| ≤ limit, `relative`
+|r| ≤ limit |H(x)|, `residual_relative` |r| ≤ limit |r of the first sweep|. All norms are Euclidean over the field's
+values. Of several measures given for one field any one is enough, so that `absolute` with `relative` is the usual pair
+for a field that may vanish.
+
+A field that a sweep starts from and that has no criterion of its own has to be as still, relative to its magnitude, as
+the strictest of those that have one is asked to be. Were it not judged, a loop would be accepted before anything had
+arrived at the fields that are: under Jacobi a change needs as many sweeps as the loop has units to come round. A field
+that is computed anew within a sweep, and from what the sweep started from, is consistent with that by itself.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..participants.participant import Values
+
+#: Limits, relative to a field's magnitude, that one field's `absolute` or `residual_relative` criterion may mean for
+#: another: never looser than three digits, never below rounding.
+_LOOSEST, _STRICTEST = 1e-3, 1e-12
 
 
 @dataclass(frozen=True)
@@ -32,41 +42,72 @@ class Criterion:
             )
         )
 
+    def for_others(self, magnitude: float, first: float) -> float:
+        """The residual over the magnitude that this criterion asks of other fields.
+
+        `magnitude` is that of the field it is given for, `first` the norm of that field's first residual.
+        """
+        limits = [] if self.relative is None else [self.relative]
+        for limit, scale in ((self.absolute, 1.0), (self.residual_relative, first)):
+            if limit is not None:
+                meant = limit * scale / magnitude if magnitude > 0.0 else _LOOSEST
+                limits.append(min(max(meant, _STRICTEST), _LOOSEST))
+        return max(limits)
+
 
 class Convergence:
-    """The history of the residuals of several fields over the sweeps of one step."""
+    """The history of the residuals of a loop's fields over the sweeps of one step.
 
-    def __init__(self, criteria: Mapping[str, Criterion]) -> None:
+    `criteria` are those given by name, `carried` the fields that a sweep starts from. Where no field of the loop has a
+    criterion, three digits are asked of those.
+    """
+
+    def __init__(self, criteria: Mapping[str, Criterion], carried: Collection[str] = ()) -> None:
         self._criteria = criteria
+        self._carried = carried
+        self._magnitudes: dict[str, float] = {}
         self.history: list[dict[str, float]] = []
 
     def judge(self, residuals: Mapping[str, Values], values: Mapping[str, Values]) -> bool:
-        """Take the residuals and new values of a sweep; whether every field that has a criterion meets it."""
-        self.history.append({name: float(np.linalg.norm(residual)) for name, residual in residuals.items()})
+        """Take the residuals and new values of a sweep, by field; whether every field meets its criterion."""
+        first = not self.history
+        self.history.append({name: _norm(residual) for name, residual in residuals.items()})
+        for name, value in values.items():
+            # What it was before the first sweep counts as well: a field on its way to zero has a magnitude.
+            before = _norm(value - residuals[name]) if first else 0.0
+            self._magnitudes[name] = max(self._magnitudes.get(name, 0.0), _norm(value), before)
         return not self.open(values)
 
     def open(self, values: Mapping[str, Values]) -> list[str]:
         """The fields that do not meet their criterion after the last sweep."""
         last, first = self.history[-1], self.history[0]
+        named = {name: self._criteria[name] for name in last if name in self._criteria}
+        limits = [criterion.for_others(self._magnitudes[name], first[name]) for name, criterion in named.items()]
+        limit = min(limits, default=_LOOSEST)
         return [
             name
-            for name, criterion in self._criteria.items()
-            if not criterion.met(last[name], float(np.linalg.norm(values[name])), first[name])
+            for name, residual in last.items()
+            if (name in named and not named[name].met(residual, _norm(values[name]), first[name]))
+            or (name in self._carried and name not in named and not residual <= limit * self._magnitudes[name])
         ]
 
     def growth(self, name: str) -> str:
         """In words, since when the residual of a field has not been smaller than it once was; empty if it falls."""
         norms = [sweep[name] for sweep in self.history]
         best = norms.index(min(norms))
-        return "" if best == len(norms) - 1 else f", not below its value of sweep {best + 1} since"
+        return "" if best == len(norms) - 1 else f", no improvement since sweep {best + 1}"
 
     @property
     def contraction_rate(self) -> float | None:
         """Factor by which the residual shrank per sweep, of the field where that was slowest; None for one sweep."""
         sweeps = len(self.history) - 1
         rates = [
-            (self.history[-1][name] / self.history[0][name]) ** (1.0 / sweeps)
-            for name in self._criteria
-            if sweeps and self.history[0][name] > 0.0
+            (norm / self.history[0][name]) ** (1.0 / sweeps)
+            for name, norm in self.history[-1].items()
+            if sweeps and self.history[0][name] > 0.0 and (name in self._criteria or name in self._carried)
         ]
         return max(rates, default=None)
+
+
+def _norm(values: Values) -> float:
+    return float(np.linalg.norm(values))

@@ -22,6 +22,16 @@ from ..participants.participant import Participant, Port, Ramp, Values
 from .connections import Connection, End, fitted
 from .history import History
 
+_MS_PER_S = 1000.0
+
+
+@dataclass(frozen=True)
+class Use:
+    """What an input was in the last step, in its source's terms: the value at the step's end, ramped to or held."""
+
+    end: Values
+    ramped: bool
+
 
 @dataclass(frozen=True)
 class Inputs:
@@ -46,11 +56,12 @@ class Exchange:
         self._values: dict[End, Values] = {}
         self._before: dict[End, Values] = {}
         self._histories: dict[End, History] = {}
-        self._discrete: list[End] = []
+        self._discrete: dict[End, None] = {}
         # The connected inputs of each unit as they were when it was stepped last: where their ramps begin.
         self._begins: dict[str, dict[End, Values]] = {}
         self._known: set[End] = set()
         self._collected: set[End] = set()
+        self._uses: dict[Connection, Use] = {}
         self._end = 0.0
 
     @property
@@ -63,6 +74,16 @@ class Exchange:
         """The connected outputs that change at events: of them only their equality has a meaning."""
         return list(self._discrete)
 
+    @property
+    def end_ms(self) -> float:
+        """Where the present step ends."""
+        return self._end * _MS_PER_S
+
+    @property
+    def extrapolation(self) -> int:
+        """Order by which inputs that are not known yet are extrapolated."""
+        return self._behaviour.extrapolation
+
     # --- a step -------------------------------------------------------------------------------------------------------
 
     def begin(self, end: float) -> None:
@@ -71,13 +92,22 @@ class Exchange:
         self._before = dict(self._values)
         self._known.clear()
         self._collected.clear()
+        self._uses.clear()
 
     def accept(self, units: Iterable[str]) -> None:
         """The step is over: the values are those at its end; `units` stepped."""
         for end in self._collected:
             self._remember(end)
         for unit in units:
-            self._mark(unit)
+            self.mark(unit)
+
+    def mark(self, unit: str) -> None:
+        """The inputs of `unit` are what they are now: where its next ramps begin."""
+        self._begins[unit] = {
+            link.source: self._values[link.source]
+            for link in self._connections
+            if link.target.unit == unit and link.source in self._histories
+        }
 
     def undo(self) -> None:
         """The step is not taken: everything is as before `begin`."""
@@ -99,7 +129,7 @@ class Exchange:
                 if port.fixed or not initially:
                     continue
                 if port.discrete:
-                    self._discrete.append(end)
+                    self._discrete.setdefault(end)
                 else:
                     self._histories[end] = History(self._depth)
                     self._remember(end)
@@ -114,13 +144,16 @@ class Exchange:
             port = participant.inputs[link.target.name]
             if (port.fixed or self._is_fixed(link.source)) and not initially:
                 continue
+            at_end = self._at_end(link.source)
+            if link.source in self._histories:
+                self._uses[link] = Use(at_end, ramps)
             with blaming(unit):
                 if ramps and not port.discrete:
-                    participant.ramp(port.name, self._ramp(unit, link, port))
+                    participant.ramp(port.name, self._ramp(link, port))
                 else:
-                    participant.set(port.name, fitted(link.carried(self._at_end(link.source)), port))
+                    participant.set(port.name, fitted(link.carried(at_end), port))
         if initially:
-            self._mark(unit)
+            self.mark(unit)
 
     def latest(self, end: End) -> Values:
         """The value that connected inputs are fed with."""
@@ -136,6 +169,18 @@ class Exchange:
         if end not in self._histories:
             return self._values[end]
         return self._histories[end].extrapolated(self._end, self._behaviour.extrapolation if order is None else order)
+
+    def begun(self, link: Connection) -> Values:
+        """What the input of `link` is fed by as it was when its unit was stepped last, where a ramp begins."""
+        return self._begins[link.target.unit].get(link.source, self._values[link.source])
+
+    def used(self) -> Iterator[tuple[Connection, Use]]:
+        """How inputs were set in this step whose source and whose unit both took it."""
+        return ((link, use) for link, use in self._uses.items() if link.source in self._collected)
+
+    def stepped(self, end: End) -> bool:
+        """Whether the value of an output is new in this step; that of a unit which waits is older."""
+        return end in self._collected
 
     def depth(self, end: End) -> int:
         """How many past values of an output are known; of a discrete one the last."""
@@ -183,7 +228,7 @@ class Exchange:
             return self._values[source]
         return self.foretold(source)
 
-    def _ramp(self, unit: str, link: Connection, port: Port) -> Ramp:
+    def _ramp(self, link: Connection, port: Port) -> Ramp:
         """How the input `port` runs over the step, fed by `link`."""
         source, curvature = link.source, None
         end = self._at_end(source)
@@ -191,7 +236,7 @@ class Exchange:
             # A unit that ramps its inputs would ramp from the value before: there is no way but to begin where it ends.
             held = fitted(link.carried(end), port)
             return Ramp(held, held)
-        begin = self._begins[unit].get(source, self._values[source])
+        begin = self.begun(link)
         if self._behaviour.extrapolation >= 2:
             curvature = 0.0 * end if source in self._known else self._histories[source].curvature()
         ramp = link.ramped(Ramp(begin, end, curvature))
@@ -201,13 +246,6 @@ class Exchange:
     def _remember(self, end: End) -> None:
         if end in self._histories:
             self._histories[end].add(self._end, self._values[end])
-
-    def _mark(self, unit: str) -> None:
-        self._begins[unit] = {
-            link.source: self._values[link.source]
-            for link in self._connections
-            if link.target.unit == unit and link.source in self._histories
-        }
 
     def _is_fixed(self, end: End) -> bool:
         return self._participants[end.unit].outputs[end.name].fixed

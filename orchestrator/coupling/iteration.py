@@ -1,15 +1,15 @@
-"""Iterated coupling: the sweeps of an explicit scheme, repeated over the same step until the interface stands still.
+"""Iterated coupling: the sweeps of an explicit scheme, repeated over the same step until the interface has converged.
 
 Units that lie in no loop need no iteration: the loops of the connection graph are found, those upstream step before
 them and those downstream after, once. The units of a loop are taken back to the step's begin before every sweep but
-the first, which needs their rollback.
+the first, which needs their rollback. Before the first step the initial values of a loop are made to agree in the same
+way, in initialization mode, where outputs follow inputs without a step.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from ..errors import NotConverged
@@ -18,8 +18,9 @@ from .acceleration import Acceleration
 from .connections import Connection, End
 from .convergence import Convergence, Criterion
 from .exchange import Exchange
+from .loops import Group, groups_in_order, inside
 from .rollback import Rollback
-from .schemes import Step, Sweep, Sweeps
+from .schemes import GaussSeidel, Step, Sweep, Sweeps
 
 #: Change of a field's magnitude by which what an acceleration remembers is of another scale and is forgotten.
 _RESCALED = 2.0
@@ -30,7 +31,7 @@ _SHRINKS = 0.8
 
 @dataclass(frozen=True)
 class Limits:
-    """When to stop: a criterion per converged field ("unit.field"), or the number of sweeps."""
+    """When to stop: by the criteria given ("unit.field", at least one in every loop), or the number of sweeps."""
 
     criteria: Mapping[str, Criterion]
     max_iterations: int
@@ -38,7 +39,7 @@ class Limits:
 
 
 class Iterated:
-    """Wraps an explicit scheme: repeats its sweeps over each loop until the criteria are met.
+    """Wraps an explicit scheme: repeats its sweeps over each loop until all that its units exchange has converged.
 
     Parameters
     ----------
@@ -51,6 +52,8 @@ class Iterated:
     limits:
         When to stop, and whether reaching the limit is an error.
     """
+
+    settles = True
 
     def __init__(
         self,
@@ -66,67 +69,96 @@ class Iterated:
         self._acceleration = acceleration
         self._limits = limits
         self._scales: dict[End, float] = {}
-        self._grouped: dict[tuple[str, ...], list[tuple[list[str], bool]]] = {}
+        self._grouped: dict[tuple[str, ...], list[Group]] = {}
 
     def advance(self, units: Sequence[str], exchange: Exchange, step: Step) -> Sweeps:
         """See Scheme; NotConverged where a loop leaves the numbers, or misses its criteria and that is an error."""
-        histories, converged = [], True
+        sweeps = Sweeps()
+        for group in self.groups(units):
+            if group.is_loop:
+                sweeps = self._iterate(group.units, exchange, step, sweeps)
+            else:
+                self._scheme.advance(group.units, exchange, step)
+        return sweeps
+
+    def groups(self, units: Sequence[str]) -> list[Group]:
+        """`units` in groups to be stepped one after the other, of which the loops are iterated."""
         order = tuple(units)
         if order not in self._grouped:
-            self._grouped[order] = self.groups(order)
-        for group, is_loop in self._grouped[order]:
-            if is_loop:
-                history, found = self._iterate(group, exchange, step)
-                histories.append(history)
-                converged = converged and found
-            else:
-                self._scheme.advance(group, exchange, step)
-        return Sweeps(tuple(histories), converged)
+            self._grouped[order] = groups_in_order(order, self._moving(order))
+        return self._grouped[order]
 
-    def groups(self, units: Sequence[str]) -> list[tuple[list[str], bool]]:
-        """`units` in groups to be stepped one after the other, each in the order given, and whether it is a loop."""
-        graph = nx.DiGraph()
-        graph.add_nodes_from(units)
-        links = [(link.source.unit, link.target.unit) for link in self._connections]
-        graph.add_edges_from((source, target) for source, target in links if source in units and target in units)
-        loops = nx.condensation(graph)
-        place = {unit: number for number, unit in enumerate(units)}
-        order = nx.lexicographical_topological_sort(
-            loops, key=lambda number: min(place[unit] for unit in loops.nodes[number]["members"])
-        )
-        members = [sorted(loops.nodes[number]["members"], key=place.__getitem__) for number in order]
-        return [(group, len(group) > 1 or graph.has_edge(group[0], group[0])) for group in members]
+    def fields(self, loop: Sequence[str]) -> dict[str, bool]:
+        """The fields ("unit.field") that the units of a loop exchange in every step, and whether its sweeps carry them.
 
-    def _iterate(self, group: Sequence[str], exchange: Exchange, step: Step) -> tuple[Convergence, bool]:
-        inside = self._inside(group)
-        interface = list(dict.fromkeys(link.source for link in inside))
-        carried = self._scheme.carried(group, inside)
-        convergence = Convergence(
-            {str(end): self._limits.criteria[str(end)] for end in interface if str(end) in self._limits.criteria}
-        )
-        self._acceleration.begin()
-        exchange.overwrite({end: exchange.foretold(end) for end in interface})
+        Those that are carried have to converge; the others are computed from them in the same sweep.
+        """
+        links = self._moving(loop)
+        carried = self._scheme.carried(loop, links)
+        return {str(end): end in carried for end in _sources(links)}
+
+    def settle(self, group: Sequence[str], exchange: Exchange, complete: Callable[[], None]) -> Sweeps:
+        """See Scheme; NotConverged as for a step. Sweeps are those of Gauss–Seidel, whatever makes those of steps."""
+        links = inside(group, self._connections)
+
+        def sweep(number: int) -> None:
+            for unit in group:
+                exchange.feed(unit, initially=True)
+                exchange.collect(unit, initially=True)
+
+        # What the units are without each other is where the iteration starts.
+        sweep(0)
+        settled = self._converged(links, GaussSeidel().carried(group, links), exchange, sweep, Sweeps())
+        earlier = {end: exchange.latest(end) for end in _sources(links)}
+        complete()
+        # There are FMUs whose outputs do not follow their inputs before they leave initialization mode.
+        values = {str(end): exchange.latest(end) for end in earlier}
+        residuals = {str(end): exchange.latest(end) - before for end, before in earlier.items()}
+        agree = settled.loops[-1].judge(residuals, values)
+        return Sweeps(settled.loops, settled.converged and agree)
+
+    def _iterate(self, group: Sequence[str], exchange: Exchange, step: Step, before: Sweeps) -> Sweeps:
+        links = self._moving(group)
+        exchange.overwrite({end: exchange.foretold(end) for end in _sources(links)})
         with Rollback(self._participants, group) as begin:
-            for sweep in range(1, self._limits.max_iterations + 1):
-                if sweep > 1:
+
+            def sweep(number: int) -> None:
+                if number > 1:
                     begin.restore()
-                before = {end: exchange.latest(end) for end in interface}
                 self._scheme.advance(group, exchange, step)
-                after = {end: exchange.latest(end) for end in interface}
-                residuals = {str(end): after[end] - before[end] for end in interface}
-                values = {str(end): after[end] for end in interface}
-                if convergence.judge(residuals, values):
-                    return convergence, True
-                if sweep == 1:
-                    self._rescale({end: after[end] for end in carried})
-                if sweep < self._limits.max_iterations:
-                    following = self._accelerated({end: (before[end], after[end]) for end in carried})
-                    if not all(np.isfinite(value).all() for value in following.values()):
-                        raise NotConverged(self._explain(convergence, values, residuals))
-                    exchange.overwrite(following)
+
+            return self._converged(links, self._scheme.carried(group, links), exchange, sweep, before)
+
+    def _converged(
+        self,
+        links: Sequence[Connection],
+        carried: Sequence[End],
+        exchange: Exchange,
+        sweep: Callable[[int], None],
+        before: Sweeps,
+    ) -> Sweeps:
+        """Repeat `sweep` until what the `links` carry has converged; the history of it is added to those `before`."""
+        interface = _sources(links)
+        convergence = Convergence(self._limits.criteria, [str(end) for end in carried])
+        self._acceleration.begin()
+        for number in range(1, self._limits.max_iterations + 1):
+            earlier = {end: exchange.latest(end) for end in interface}
+            sweep(number)
+            later = {end: exchange.latest(end) for end in interface}
+            residuals = {str(end): later[end] - earlier[end] for end in interface}
+            values = {str(end): later[end] for end in interface}
+            if convergence.judge(residuals, values):
+                return before.with_loop(convergence, True)
+            if number == 1:
+                self._rescale({end: later[end] for end in carried})
+            if number < self._limits.max_iterations:
+                following = self._accelerated({end: (earlier[end], later[end]) for end in carried})
+                if not all(np.isfinite(value).all() for value in following.values()):
+                    raise self._failure(convergence, values, residuals, before)
+                exchange.overwrite(following)
         if self._limits.fail:
-            raise NotConverged(self._explain(convergence, values, residuals))
-        return convergence, False
+            raise self._failure(convergence, values, residuals, before)
+        return before.with_loop(convergence, False)
 
     def memory(self) -> dict[str, Any]:
         """See Scheme: the scales of the fields. What the acceleration keeps of earlier steps is learned anew."""
@@ -138,14 +170,12 @@ class Iterated:
         known = {link.source for link in self._connections}
         self._scales = {end: float(scales[str(end)]) for end in known if str(end) in scales}
 
-    def _inside(self, group: Sequence[str]) -> list[Connection]:
-        """The connections by which the units of a loop feed each other in every step."""
+    def _moving(self, units: Sequence[str]) -> list[Connection]:
+        """The connections by which `units` feed each other in every step."""
         return [
             link
-            for link in self._connections
-            if link.source.unit in group
-            and link.target.unit in group
-            and not self._participants[link.source.unit].outputs[link.source.name].fixed
+            for link in inside(units, self._connections)
+            if not self._participants[link.source.unit].outputs[link.source.name].fixed
         ]
 
     def _rescale(self, values: Mapping[End, Values]) -> None:
@@ -166,7 +196,13 @@ class Iterated:
         parts = np.split(following, ends)
         return {end: part.reshape(after.shape) for (end, (_, after)), part in zip(sweep.items(), parts, strict=True)}
 
-    def _explain(self, convergence: Convergence, values: Mapping[str, Values], residuals: Mapping[str, Values]) -> str:
+    def _failure(
+        self,
+        convergence: Convergence,
+        values: Mapping[str, Values],
+        residuals: Mapping[str, Values],
+        before: Sweeps,
+    ) -> NotConverged:
         rate = convergence.contraction_rate
         lines = []
         for name in convergence.open(values):
@@ -176,16 +212,22 @@ class Iterated:
                 f"{name} (largest at {self._place(name)} {', '.join(str(int(index)) for index in where)}: "
                 f"{residual[where]:.3g}{convergence.growth(name)})"
             )
-        return (
+        return NotConverged(
             f"no convergence in {len(convergence.history)} sweeps: {', '.join(lines)}; "
             + ("" if rate is None else f"the residual changes by a factor of {rate:.3g} per sweep; ")
-            + _remedy(rate, len(convergence.history))
+            + _remedy(rate, len(convergence.history)),
+            before.with_loop(convergence, False),
         )
 
     def _place(self, name: str) -> str:
         unit, _, output = name.partition(".")
         location = self._participants[unit].outputs[output].location
         return location if location in ("node", "element") else "index"
+
+
+def _sources(links: Iterable[Connection]) -> list[End]:
+    """The outputs that `links` carry, each once."""
+    return list(dict.fromkeys(link.source for link in links))
 
 
 def _remedy(rate: float | None, sweeps: int) -> str:

@@ -3,7 +3,7 @@
 Whatever ends the loop, those who watch it (`Observer`) have seen every accepted step before.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -12,14 +12,25 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import InputError, NotConverged, ParticipantError, ParticipantLost, RunError, did_you_mean
+from ..errors import (
+    InputError,
+    NotConverged,
+    ParticipantError,
+    ParticipantLost,
+    ParticipantTerminated,
+    RunError,
+    Terminated,
+    did_you_mean,
+)
 from ..participants.participant import Participant, Wait
 from ..stopwatch import Span, Stopwatch, seconds_by_label
-from .connections import Connection, initial_order
+from .connections import Connection
 from .exchange import Exchange, Inputs, blaming
+from .loops import groups_in_order
+from .missed_tolerance import Missed
 from .rollback import Rollback
 from .schemes import Scheme, Sweeps
-from .step_control import FixedStep, StepControl
+from .step_control import FixedStep, StepControl, Verdict
 from .timeline import Timeline
 
 _MS_PER_S = 1000.0
@@ -33,13 +44,19 @@ WAITING = "waiting"
 
 @dataclass(frozen=True)
 class Accepted:
-    """What is known of a step that was accepted (step 0 is the initial state)."""
+    """What is known of a step that was accepted (step 0 is the initial state).
+
+    `error` is its estimated error over the tolerance, if there is one; `missed` says that it is above and the step
+    could not be any shorter.
+    """
 
     number: int
     time_ms: float
     size_ms: float
     sweeps: Sweeps = field(default_factory=Sweeps)
     rejected: int = 0
+    error: float | None = None
+    missed: bool = False
     seconds: Mapping[str, float] = field(default_factory=dict)
     spans: tuple[Span, ...] = ()
     is_output: bool = True
@@ -92,6 +109,7 @@ class Master:
         self._control = control or FixedStep()
         self._every = every or {}
         self._initialised = False
+        self._settled = Sweeps()
         self._tick = 0
         self._number = 0
         # Where each unit's own time stands, and how many exchanges it has let pass.
@@ -102,6 +120,11 @@ class Master:
     def done(self) -> bool:
         """Whether the run is at its end."""
         return self._tick >= self._timeline.stop
+
+    @property
+    def missed(self) -> Missed:
+        """The steps that missed the tolerance of adaptive steps, by what is known now."""
+        return self._control.missed()
 
     def initialise(self) -> None:
         """Bring all units to their initial state, each after those that feed it.
@@ -114,10 +137,15 @@ class Master:
             Where a unit has no initial state.
         """
         static = [unit for unit in self.participants if unit not in self.units]
-        for unit in initial_order([*static, *self.units], self.connections):
-            measured = self.watch.measure(WAITING, "initialise"), self.watch.measure(unit, "initialise")
-            with measured[0], measured[1], _failing("failed at its initialisation"):
-                self._initialise(unit)
+        for group in groups_in_order([*static, *self.units], self.connections):
+            if group.is_loop and self._scheme.settles:
+                self._settle(group.units)
+            else:
+                for unit in group.units:
+                    with self._initialising(unit):
+                        self._begin(unit)
+                        self.exchange.feed(unit, initially=True)
+                        self._complete(unit)
         self._initialised = True
 
     def run(self, observers: Sequence[Observer], stop: Any = False) -> None:
@@ -129,7 +157,7 @@ class Master:
             self.initialise()
         if self._number == 0:
             with _failing("failed at its initialisation"):
-                self._show(Accepted(0, 0.0, 0.0, spans=self.watch.lap()), observers)
+                self._show(Accepted(0, 0.0, 0.0, self._settled, spans=self.watch.lap()), observers)
         while not self.done and not stop:
             accepted = self._take_step()
             with _failing(*_told(accepted.time_ms - accepted.size_ms, accepted.time_ms)):
@@ -172,28 +200,52 @@ class Master:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _initialise(self, unit: str) -> None:
-        participant = self.participants[unit]
+    @contextmanager
+    def _initialising(self, label: str) -> Iterator[None]:
+        measured = self.watch.measure(WAITING, "initialise"), self.watch.measure(label, "initialise")
+        with measured[0], measured[1], _failing("failed at its initialisation"):
+            yield
+
+    def _begin(self, unit: str) -> None:
         with blaming(unit):
-            participant.begin()
-        self.exchange.feed(unit, initially=True)
+            self.participants[unit].begin()
+
+    def _complete(self, unit: str) -> None:
         with blaming(unit):
-            participant.complete()
+            self.participants[unit].complete()
         self.exchange.collect(unit, initially=True)
+
+    def _settle(self, loop: Sequence[str]) -> None:
+        """Initialise the units of a loop together, with initial values that agree."""
+        for unit in loop:
+            with self._initialising(unit):
+                self._begin(unit)
+
+        def complete() -> None:
+            for unit in loop:
+                with self._initialising(unit):
+                    self._complete(unit)
+
+        with _failing("failed at its initialisation"):
+            settled = self._scheme.settle(loop, self.exchange, complete)
+        self._settled = Sweeps((*self._settled.loops, *settled.loops), self._settled.converged and settled.converged)
+        for unit in loop:
+            self.exchange.mark(unit)
 
     def _take_step(self) -> Accepted:
         """Step until a step is good enough; shorter from one attempt to the next."""
-        rejected = 0
+        rejected, causes = 0, dict[str, str]()
         with self.watch.measure(MASTER, "step"):
             while True:
                 ticks = self._control.next(self._tick)
                 begin, end = self._timeline.time_ms(self._tick), self._timeline.time_ms(self._tick + ticks)
                 units = self._due(ticks)
-                with _failing(*_told(begin, end)):
-                    sweeps = self._attempt(units, ticks, end)
-                if sweeps is not None:
+                with _failing(*_told(begin, end, causes), end):
+                    attempt = self._attempt(units, ticks, end, causes)
+                if attempt is not None:
                     break
                 rejected += 1
+            sweeps, verdict = attempt
             self._tick += ticks
             self._number += 1
             self.exchange.accept(units)
@@ -204,21 +256,40 @@ class Master:
         spans = self.watch.lap()
         seconds = dict.fromkeys(self.units, 0.0) | seconds_by_label(spans)
         seconds[MASTER] -= seconds.pop(WAITING, 0.0)
-        is_output = self._timeline.is_output(self._tick)
-        size, waiting = self._timeline.size_ms(ticks), frozenset(self.units) - frozenset(units)
-        return Accepted(self._number, end, size, sweeps, rejected, seconds, spans, is_output, waiting)
+        return Accepted(
+            self._number,
+            end,
+            self._timeline.size_ms(ticks),
+            sweeps,
+            rejected,
+            verdict.error,
+            verdict.missed,
+            seconds,
+            spans,
+            self._timeline.is_output(self._tick),
+            frozenset(self.units) - frozenset(units),
+        )
 
-    def _attempt(self, units: Sequence[str], ticks: int, end_ms: float) -> Sweeps | None:
-        """One step to `end_ms`; None if it was refused, and everything is as before."""
+    def _attempt(
+        self, units: Sequence[str], ticks: int, end_ms: float, causes: dict[str, str]
+    ) -> tuple[Sweeps, Verdict] | None:
+        """One step to `end_ms`; None if it was refused, and everything is as before.
+
+        Why a unit or the coupling failed in a step that can be repeated shorter is added to `causes`, once.
+        """
         self.exchange.begin(end_ms / _MS_PER_S)
         with Rollback(self.participants, units if self._control.refuses else ()) as before:
             try:
                 sweeps = self._scheme.advance(units, self.exchange, partial(self._step, self._tick + ticks))
-                if self._control.good(self.exchange, ticks):
-                    return sweeps
+                verdict = self._control.judge(self.exchange, ticks)
+                if verdict.accepted:
+                    return sweeps, verdict
             except (ParticipantError, NotConverged) as error:
-                if isinstance(error, ParticipantLost) or not self._control.shorten(ticks):
+                # Neither a unit that is gone nor one that has come to its end is helped by a shorter step.
+                final = isinstance(error, ParticipantLost | ParticipantTerminated)
+                if final or not self._control.shorten(ticks):
                     raise
+                causes.setdefault(str(error), _cause(error, self._timeline.size_ms(ticks)))
             before.restore()
             self.exchange.undo()
         return None
@@ -263,20 +334,39 @@ class Master:
             observer.accept(step, self.exchange)
 
 
-def _told(begin_ms: float, end_ms: float) -> tuple[str, str]:
-    """When a step failed, and what is left."""
-    return f"failed in the step from {begin_ms:g} to {end_ms:g} ms", f". The results up to {begin_ms:g} ms are complete"
+def _told(begin_ms: float, end_ms: float, causes: Mapping[str, str] | None = None) -> tuple[str, Callable[[], str]]:
+    """When a step failed, and what is left; with why longer steps were given up before, as `causes` know by then."""
+
+    def left() -> str:
+        earlier = "".join(f"; before that {cause}" for cause in (causes or {}).values())
+        return f"{earlier}. The results up to {begin_ms:g} ms are complete"
+
+    return f"failed in the step from {begin_ms:g} to {end_ms:g} ms", left
+
+
+def _cause(error: ParticipantError | NotConverged, size_ms: float) -> str:
+    who = "the coupling" if isinstance(error, NotConverged) else f"unit '{error.unit}'"
+    return f"{who} failed in a step of {size_ms:g} ms: {error}"
 
 
 @contextmanager
-def _failing(when: str, consolation: str = "") -> Iterator[None]:
-    """Make a RunError of what a participant, or the coupling of them, could not do."""
+def _failing(when: str, left: Callable[[], str] = str, time_ms: float | None = None) -> Iterator[None]:
+    """Make a RunError, of the step to `time_ms`, of what a participant, or the coupling of them, could not do."""
     try:
         yield
+    except ParticipantTerminated as error:
+        raise _at(time_ms, Terminated(f"unit '{error.unit}' ended the simulation: {error}{left()}")) from error
     except ParticipantError as error:
-        raise RunError(f"unit '{error.unit}' {when}: {error}{consolation}") from error
+        raise _at(time_ms, RunError(f"unit '{error.unit}' {when}: {error}{left()}")) from error
     except NotConverged as error:
-        raise RunError(f"the coupling {when}: {error}{consolation}") from error
+        failure = _at(time_ms, RunError(f"the coupling {when}: {error}{left()}"))
+        failure.sweeps = error.sweeps
+        raise failure from error
+
+
+def _at(time_ms: float | None, error: RunError) -> RunError:
+    error.time_ms = time_ms
+    return error
 
 
 def stepping_order(participants: Mapping[str, Participant], order: Sequence[str] | None) -> list[str]:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from types import TracebackType
 from typing import Any
 
+from ..errors import ParticipantError
 from ..participants.participant import Participant
 from .exchange import blaming
 
@@ -35,6 +36,14 @@ class Rollback:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        failure: ParticipantError | None = None
         while self._states:
             unit, state = self._states.popitem()
-            self._participants[unit].free(state)
+            try:
+                with blaming(unit):
+                    self._participants[unit].free(state)
+            except ParticipantError as refused:
+                failure = failure or refused
+        # A unit that has failed may refuse this as well; why it failed is what a person wants to know.
+        if failure is not None and error is None:
+            raise failure

@@ -28,6 +28,10 @@ class Sweeps:
     loops: tuple[Convergence, ...] = ()
     converged: bool = True
 
+    def with_loop(self, loop: Convergence, converged: bool) -> "Sweeps":
+        """The same with the history of one more loop, and whether that has converged."""
+        return Sweeps((*self.loops, loop), self.converged and converged)
+
     @property
     def iterations(self) -> int:
         """Sweeps over the loop that needed most of them."""
@@ -46,10 +50,19 @@ class Sweeps:
 
 
 class Scheme(Protocol):
-    """Takes all units over one communication step."""
+    """Advances all units by one communication step."""
+
+    #: Whether it makes the initial values of a loop agree; if not, inputs that close a loop have their start values.
+    settles: bool
 
     def advance(self, units: Sequence[str], exchange: Exchange, step: Step) -> Sweeps:
         """Step `units`, and leave their new outputs in `exchange`."""
+
+    def settle(self, group: Sequence[str], exchange: Exchange, complete: Callable[[], None]) -> Sweeps:
+        """Make the initial values of a loop agree, if it `settles`: its units are in initialization mode.
+
+        `complete` lets them leave it, and collects their outputs.
+        """
 
     def memory(self) -> dict[str, Any]:
         """What it has learned, for a checkpoint."""
@@ -65,8 +78,15 @@ class Sweep(Scheme, Protocol):
         """The outputs of `units`, connected by `links`, whose values before a sweep decide its outcome."""
 
 
-class _Forgetful:
-    """Explicit schemes learn nothing."""
+class _Explicit:
+    """Explicit schemes learn nothing, and take initial values as they come."""
+
+    settles = False
+
+    def settle(self, group: Sequence[str], exchange: Exchange, complete: Callable[[], None]) -> Sweeps:
+        """See Scheme."""
+        complete()
+        return Sweeps()
 
     def memory(self) -> dict[str, Any]:
         """See Scheme."""
@@ -76,7 +96,7 @@ class _Forgetful:
         """See Scheme."""
 
 
-class Jacobi(_Forgetful):
+class Jacobi(_Explicit):
     """All units step at once, from what is known at the step's begin."""
 
     def advance(self, units: Sequence[str], exchange: Exchange, step: Step) -> Sweeps:
@@ -93,7 +113,7 @@ class Jacobi(_Forgetful):
         return list(dict.fromkeys(link.source for link in links))
 
 
-class GaussSeidel(_Forgetful):
+class GaussSeidel(_Explicit):
     """Each unit steps with the newest values there are."""
 
     def advance(self, units: Sequence[str], exchange: Exchange, step: Step) -> Sweeps:

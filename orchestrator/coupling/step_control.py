@@ -1,13 +1,16 @@
 """How long the next communication step is, and whether the last one was good enough."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import ceil
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..participants.participant import Values
+from ..participants.participant import Participant, Values
+from .deviation import deviations
 from .exchange import Exchange
+from .missed_tolerance import Missed, MissedTolerance
 from .timeline import Timeline
 
 #: How far a ratio of times may be from a whole number and still be taken for rounding.
@@ -17,8 +20,24 @@ _ROUNDING = 1e-9
 _NO_ERROR = 1e-6
 
 
+#: Change of an output, relative to its magnitude, that is rounding.
+_NO_CHANGE = 1e-12
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a step is accepted; its estimated error over the tolerance, if there is an estimate.
+
+    One that `missed` the tolerance is accepted all the same, because it cannot be any shorter.
+    """
+
+    accepted: bool
+    error: float | None = None
+    missed: bool = False
+
+
 class StepControl(Protocol):
-    """Chooses the steps of a run. Between two of them it is asked once for the next and told how each one went."""
+    """Chooses the steps of a run. It is asked for each step and judges how it went."""
 
     #: Whether it may refuse a step, which then has to be rolled back.
     refuses: bool
@@ -28,11 +47,14 @@ class StepControl(Protocol):
     def next(self, tick: int) -> int:
         """Ticks of the step from `tick` on."""
 
-    def good(self, exchange: Exchange, ticks: int) -> bool:
-        """Whether a step of so many ticks is to be accepted; if not, the next one is shorter."""
+    def judge(self, exchange: Exchange, ticks: int) -> Verdict:
+        """Judge a step of so many ticks; if it is not accepted, the next one is shorter."""
 
     def shorten(self, ticks: int) -> bool:
         """A step of so many ticks failed: make the next one shorter. False where it cannot be any shorter."""
+
+    def missed(self) -> Missed:
+        """The steps that missed the tolerance because they could not be any shorter, by what is known now."""
 
     def memory(self) -> dict[str, Any]:
         """What it has learned, for a checkpoint."""
@@ -51,13 +73,17 @@ class FixedStep:
         """See StepControl."""
         return 1
 
-    def good(self, exchange: Exchange, ticks: int) -> bool:
+    def judge(self, exchange: Exchange, ticks: int) -> Verdict:
         """See StepControl."""
-        return True
+        return Verdict(True)
 
     def shorten(self, ticks: int) -> bool:
         """See StepControl."""
         return False
+
+    def missed(self) -> Missed:
+        """See StepControl."""
+        return Missed()
 
     def memory(self) -> dict[str, Any]:
         """See StepControl."""
@@ -70,11 +96,11 @@ class FixedStep:
 class AdaptiveStep:
     """Steps whose estimated error is near the tolerance, by a PI controller (Gustafsson 1991).
 
-    The error of a step is taken to be that of foretelling: of every exchanged field, the root mean square of what the
-    step gave less the line through the two values before, relative to the largest magnitude that the field's change
-    over the run has had. That is what an extrapolated input is wrong by at the end of the step, and about eight times
-    what an interpolated one is wrong by in its middle. The worst field counts. The first step is not judged, for there
-    is no line yet.
+    The error of a step is that of its inputs (`deviation`): the root mean square over a field, relative to the largest
+    magnitude that the field's change over the run has had. The worst counts. For ramped inputs it is that of
+    extrapolation, the distance from the line through the two values before, about eight times what an interpolated
+    input is wrong by in its middle; for held ones it is half the change over the step, so that steps are short. The
+    first step is not judged: there is nothing yet to compare its changes with.
 
     Parameters
     ----------
@@ -86,6 +112,8 @@ class AdaptiveStep:
         Limits of a step; one that has to hit an output may be shorter.
     first_ms:
         The first step.
+    participants:
+        The units, which may follow their inputs inside a step or hold them.
     """
 
     refuses = True
@@ -97,8 +125,17 @@ class AdaptiveStep:
     #: Factor above the tolerance from which a step is repeated: a repetition costs more than a slightly larger error.
     _REFUSED = 2.0
 
-    def __init__(self, timeline: Timeline, tolerance: float, min_ms: float, max_ms: float, first_ms: float) -> None:
+    def __init__(
+        self,
+        timeline: Timeline,
+        tolerance: float,
+        min_ms: float,
+        max_ms: float,
+        first_ms: float,
+        participants: Mapping[str, Participant],
+    ) -> None:
         self._timeline = timeline
+        self._participants = participants
         self._tolerance = tolerance
         self._shortest = max(1, ceil(min_ms / timeline.tick_ms - _ROUNDING))
         self._longest = max(self._shortest, int(max_ms / timeline.tick_ms + _ROUNDING))
@@ -109,6 +146,7 @@ class AdaptiveStep:
         self._before = 1.0
         self._origins: dict[str, Values] = {}
         self._ranges: dict[str, float] = {}
+        self._missed = MissedTolerance()
 
     def next(self, tick: int) -> int:
         """See StepControl. The way to the next output is divided evenly, so that no short step is left of it.
@@ -120,14 +158,32 @@ class AdaptiveStep:
         steps = ceil(left / longest - _ROUNDING)
         return ceil(left / steps)
 
-    def good(self, exchange: Exchange, ticks: int) -> bool:
+    def judge(self, exchange: Exchange, ticks: int) -> Verdict:
         """See StepControl."""
-        error = self._error(exchange) / self._tolerance
-        if error > self._REFUSED and ticks > self._shortest:
+        ranges = self._ranges_with(exchange)
+        errors = {
+            (name, order): magnitude / ranges[name] / self._tolerance
+            for (name, order), magnitude in self._magnitudes(exchange).items()
+            if name in ranges
+        }
+        worst = max(errors.values(), default=0.0)
+        # An error of first order is squared, so that all grow with the square of the step.
+        error = max((value ** (2 / order) for (_, order), value in errors.items()), default=0.0)
+        above = error > self._REFUSED
+        if above and ticks > self._shortest:
             self._wanted = max(self._shortest, ticks * max(self._SMALLEST, self._SAFETY * error**-0.5))
             self._ceiling = ticks - 1
-            return False
+            return Verdict(False, worst)
+        # Only a step that is taken tells of the run: what a refused one went to, never was.
+        self._ranges = ranges
         self._ceiling = self._longest
+        if above:
+            needed = {
+                name: ranges[name] * value / self._REFUSED ** (order / 2)
+                for (name, order), value in errors.items()
+                if value ** (2 / order) > self._REFUSED
+            }
+            self._missed.add(exchange.end_ms, needed)
         # A step that was cut to hit an output tells what the one that was wanted would have done.
         length = max(float(ticks), self._wanted)
         error = max(error * (length / ticks) ** 2, _NO_ERROR)
@@ -135,7 +191,11 @@ class AdaptiveStep:
         factor = min(max(factor, self._SMALLEST), self._LARGEST)
         self._wanted = min(max(length * factor, self._shortest), self._longest)
         self._before = error
-        return True
+        return Verdict(True, worst, missed=above)
+
+    def missed(self) -> Missed:
+        """See StepControl."""
+        return self._missed.counted(self._ranges)
 
     def shorten(self, ticks: int) -> bool:
         """See StepControl."""
@@ -152,6 +212,7 @@ class AdaptiveStep:
             "before": np.array(self._before),
             "origins": dict(self._origins),
             "ranges": {name: np.array(value) for name, value in self._ranges.items()},
+            "missed": self._missed.memory(),
         }
 
     def resume(self, memory: Mapping[str, Any]) -> None:
@@ -159,16 +220,27 @@ class AdaptiveStep:
         self._wanted, self._before = float(memory["wanted"]), float(memory["before"])
         self._origins = dict(memory["origins"])
         self._ranges = {name: float(value) for name, value in memory["ranges"].items()}
+        self._missed.resume(memory["missed"])
 
-    def _error(self, exchange: Exchange) -> float:
-        worst = 0.0
+    def _ranges_with(self, exchange: Exchange) -> dict[str, float]:
+        """How far each field that took this step has moved over the run, this step included."""
+        ranges = dict(self._ranges)
         for end in exchange.moving:
-            name, value = str(end), exchange.latest(end)
-            change = _magnitude(value - self._origins.setdefault(name, exchange.foretold(end, 0)))
-            self._ranges[name] = max(self._ranges.get(name, 0.0), change)
-            if self._ranges[name] > 0.0 and exchange.depth(end) > 1:
-                worst = max(worst, _magnitude(value - exchange.foretold(end, 1)) / self._ranges[name])
-        return worst
+            if exchange.stepped(end):
+                name, value = str(end), exchange.latest(end)
+                origin = self._origins.setdefault(name, exchange.foretold(end, 0))
+                change = _magnitude(value - origin)
+                if change > _NO_CHANGE * max(_magnitude(value), _magnitude(origin)):
+                    ranges[name] = max(ranges.get(name, 0.0), change)
+        return ranges
+
+    def _magnitudes(self, exchange: Exchange) -> dict[tuple[str, int], float]:
+        """By field and order in the step, the largest of the step's deviations."""
+        largest: dict[tuple[str, int], float] = {}
+        for deviation in deviations(exchange, self._participants):
+            key = str(deviation.end), deviation.order
+            largest[key] = max(largest.get(key, 0.0), _magnitude(deviation.values))
+        return largest
 
 
 def _magnitude(values: Values) -> float:

@@ -107,7 +107,7 @@ def read_description(file: FmuFile) -> Description:
             raise InputError(
                 f"FMPy cannot read it as an FMU ({shortened(str(error) or type(error).__name__, 200)})"
             ) from None
-    _check(variables)
+        _check(variables)
     own = _own(root)
     unit = None if own is None else own.find("Unit")
     return Description(
@@ -212,8 +212,9 @@ def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
 
 
 def _check(variables: Sequence[Variable]) -> None:
-    """InputError for names that are not unique, and for value references that no FMU can have."""
-    if len({variable.name for variable in variables}) != len(variables):
+    """InputError for names that are not unique, and for value references and dimensions that no FMU can have."""
+    names = {variable.name for variable in variables}
+    if len(names) != len(variables):
         seen: set[str] = set()
         for variable in variables:
             if variable.name in seen:
@@ -221,13 +222,13 @@ def _check(variables: Sequence[Variable]) -> None:
                     f"two of its variables are named '{shortened(variable.name)}'; export it with names of their own"
                 )
             seen.add(variable.name)
+    if None in names or "" in names:
+        raise InputError("one of its variables has no name")
+    references = [variable.valueReference for variable in variables]
+    if references and not 0 <= min(references) <= max(references) < _REFERENCES:
+        wrong = next(variable for variable in variables if not 0 <= variable.valueReference < _REFERENCES)
+        raise InputError(f"its variable '{shortened(wrong.name)}' has no valid value reference: {wrong.valueReference}")
     for variable in variables:
-        if not variable.name:
-            raise InputError("one of its variables has no name")
-        if not 0 <= variable.valueReference < _REFERENCES:
-            raise InputError(
-                f"its variable '{shortened(variable.name)}' has no valid value reference: {variable.valueReference}"
-            )
         if variable.shape and (min(variable.shape) < 0 or prod(variable.shape) > _MOST_ELEMENTS):
             raise InputError(
                 f"its variable '{shortened(variable.name)}' has the shape {quoted(variable.shape)}; dimensions are "

@@ -1,6 +1,6 @@
 """The one door to the units' floor: meshes, declarations, and units as participants without FMI."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,8 +13,10 @@ from ...units.input_ramp import INPUT_INTERPOLATION
 from ...units.mesh import Mesh
 from ...units.mesh.archive import pack_mesh
 from ...units.mesh.file import read_mesh
+from ...units.mesh.frame import check_frame, frame_warnings
 from ...units.mesh.places import Places
 from ...units.mesh.quality import signed_inverse_condition_number
+from ...units.mesh.wall import repeated_boundary
 from ...units.registry import UNITS
 from ...units.snapshot import Snapshot
 from ...units.statistics import Statistic
@@ -28,13 +30,16 @@ from .ramping import PendingRamps
 __all__ = [
     "Mesh",
     "NativeParticipant",
+    "check_mesh",
     "check_unit",
     "element_quality",
     "fmu_of_unit",
     "located",
+    "mesh_warnings",
     "packed_mesh",
     "scene_mesh",
     "unit_ports",
+    "unit_warnings",
 ]
 
 
@@ -42,10 +47,38 @@ def scene_mesh(scene: Scene, folder: Path) -> Mesh:
     """The mesh of `scene`; a mesh file's path is relative to `folder`. InputError if there is none to be had."""
     try:
         if scene.mesh is not None:
-            return read_mesh(folder / scene.mesh)
+            return read_mesh(folder / scene.mesh, scene.boundaries, scene.unit_mm)
         return build_geometry(str(scene.geometry), scene.mesh_size_mm)
     except InvalidInput as error:
         raise InputError(str(error)) from None
+
+
+def check_mesh(mesh: Mesh, scene: Scene, folder: Path, units: Collection[str]) -> None:
+    """InputError for a mesh that stands in another frame than `units` take for granted, or lacks what they need of it.
+
+    A mesh file's path is in front of what is wrong with it.
+    """
+    try:
+        check_frame(mesh, scene.scale is not None)
+        for unit in units:
+            UNITS[unit].check_mesh(mesh)
+    except InvalidInput as error:
+        origin = "" if scene.mesh is None else f"{folder / scene.mesh}: "
+        raise InputError(f"{origin}{error}") from None
+
+
+def mesh_warnings(mesh: Mesh, scene: Scene) -> list[str]:
+    """What was changed to read the mesh, and what is unusual of it."""
+    repeated = repeated_boundary(mesh)
+    unused = [] if repeated is None else [f"the boundary '{repeated}' repeats faces of others and is not used"]
+    return [*mesh.notes, *unused, *frame_warnings(mesh, scene.scale is not None)]
+
+
+def unit_warnings(unit: str, parameters: Parameters, mesh: Mesh) -> list[str]:
+    """What is unusual of a unit's parameters on `mesh`: places that are not where the mesh has them."""
+    asked = UNITS[unit](mesh)
+    asked.instantiate(parameters)
+    return list(asked.warnings())
 
 
 def packed_mesh(mesh: Mesh) -> bytes:

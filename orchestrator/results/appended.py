@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..writing import writing
 from .hdf5 import DamagedFile
-from .writing import writing
 
 
 class AppendedFile:

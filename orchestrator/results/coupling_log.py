@@ -15,9 +15,10 @@ from .table import Table
 class CouplingLog:
     """A row per accepted step: step size, sweeps, residuals, rejections and seconds by unit.
 
-    `converged` names the fields that have a criterion ("unit.field"); each has a column with its last residual.
-    `contraction_rate` is empty where one sweep measures no rate. `unconverged` keeps the times in ms of the steps that
-    were accepted although their iteration had not converged. `resumed` is the `memory` of an earlier run.
+    `converged` names the fields that iterated loops exchange ("unit.field"); each has a column with its last residual.
+    `contraction_rate` is empty where one sweep measures no rate. Where steps are `adaptive`, `error` is the estimated
+    error over the tolerance, empty where there is none, and `tolerance_missed` is 1 where it is above and the step
+    could not be any shorter. `resumed` is the `memory` of an earlier run.
     """
 
     def __init__(
@@ -25,13 +26,16 @@ class CouplingLog:
         folder: Path,
         units: Sequence[str],
         converged: Sequence[str] = (),
+        adaptive: bool = False,
         resumed: Mapping[str, Any] | None = None,
     ) -> None:
         self._units = units
         self._converged = converged
+        self._adaptive = adaptive
         residuals = [f"residual_{name}" for name in converged]
         seconds = [f"seconds_{unit}" for unit in (*units, MASTER)]
-        columns = ["time_ms", "step_ms", "iterations", *residuals, "contraction_rate", "rejected", *seconds]
+        judged = ["error", "tolerance_missed"] if adaptive else []
+        columns = ["time_ms", "step_ms", "iterations", *residuals, "contraction_rate", "rejected", *judged, *seconds]
         self._table = Table(folder / COUPLING, columns, resumed and resumed["table"])
         times = [float(row[0]) for row in self._table.rows()]
         self._rows = len(times)
@@ -39,24 +43,38 @@ class CouplingLog:
         self._stretches: list[tuple[int, int]] = []
         if resumed is not None:
             self._stretches = [(int(first), int(last)) for first, last in resumed["unconverged"].reshape(-1, 2)]
-        self.unconverged = [time for first, last in self._stretches for time in times[first : last + 1]]
+        self._unconverged = [time for first, last in self._stretches for time in times[first : last + 1]]
+        # The time of the initial values, if they do not agree: they have no row.
+        self._unsettled_ms: list[float] = [] if resumed is None else resumed["unsettled_ms"].tolist()
+
+    @property
+    def unconverged(self) -> list[float]:
+        """The times in ms of what was accepted although it had not converged, the initial values included."""
+        return self._unsettled_ms + self._unconverged
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
         """See Observer; the initial state is no step."""
+        sweeps = step.sweeps
         if step.number:
             seconds = [step.seconds[unit] for unit in (*self._units, MASTER)]
-            sweeps = step.sweeps
             # A loop one of whose units did not step in this exchange was none.
             residuals = [sweeps.residuals.get(name) for name in self._converged]
             first = [step.time_ms, step.size_ms, sweeps.iterations, *residuals, sweeps.contraction_rate, step.rejected]
-            self._table.add([*first, *seconds])
+            judged = [step.error, int(step.missed)] if self._adaptive else []
+            self._table.add([*first, *judged, *seconds])
             if not sweeps.converged:
                 self._note(step.time_ms)
             self._rows += 1
+        elif not sweeps.converged:
+            self._unsettled_ms = [step.time_ms]
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
-        return {"table": self._table.memory(), "unconverged": np.array(self._stretches, np.int64)}
+        return {
+            "table": self._table.memory(),
+            "unconverged": np.array(self._stretches, np.int64),
+            "unsettled_ms": np.array(self._unsettled_ms),
+        }
 
     def close(self) -> None:
         """Close the file."""
@@ -64,7 +82,7 @@ class CouplingLog:
 
     def _note(self, time_ms: float) -> None:
         """The step of the next row, to `time_ms`, was accepted without having converged."""
-        self.unconverged.append(time_ms)
+        self._unconverged.append(time_ms)
         before = self._stretches[-1] if self._stretches else None
         if before is not None and before[1] == self._rows - 1:
             self._stretches[-1] = (before[0], self._rows)

@@ -12,6 +12,7 @@ from typing import Any
 from ..assembly import Assembly
 from ..errors import InputError
 from ..wall_clock import WallClock
+from ..writing import allowed, remove_stale, writing
 from .checkpoint import Memories, read_checkpoint
 from .hdf5 import DamagedFile
 from .lock import FolderLock
@@ -19,8 +20,10 @@ from .names import CHECKPOINT, COUPLING, FIELDS, FMU_LOG, GROWING, ITERATIONS, P
 from .origin import Origin
 from .recording import Recording
 from .summary import is_summary
-from .whole import unfinished
-from .writing import allowed, remove_stale, writing
+from .whole import reserve, unfinished
+
+#: Space in bytes that is kept for the summary: a run that ends because the disk is full is to say so.
+_RESERVE = 16384
 
 _REMEDY = "run without --resume to begin anew"
 
@@ -96,13 +99,26 @@ class ResultsFolder:
         if before is not None:
             with self.fitting():
                 Recording.check(self.path, before)
-        # From here on nothing passes for the result of an earlier run any more.
+        with writing(self.path / SUMMARY):
+            self._remove_leftovers()
+        try:
+            with writing(self.path / SUMMARY):
+                reserve(self.path / SUMMARY, _RESERVE)
+            return self._opened(assembly, before, wall)
+        except BaseException:
+            self._remove_leftovers()
+            raise
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _opened(
+        self, assembly: Assembly, before: Memories | None, wall: Callable[[Mapping[str, Any] | None], WallClock]
+    ) -> Recording:
+        # First what would let the rest pass for the result of an earlier run.
         remove_stale(self.path / SUMMARY)
         if before is None:
             remove_stale(self.path / CHECKPOINT)
             remove_stale(self.path / FMU_LOG)
-        with allowed(self.path, "--output"):
-            self._remove_leftovers()
         if not assembly.converged:
             remove_stale(self.path / ITERATIONS)
         if assembly.mesh is None:
@@ -120,7 +136,7 @@ class ResultsFolder:
                     path.open("ab").close()
 
     def _remove_leftovers(self) -> None:
-        """Remove what was being written when a process was killed."""
+        """Remove what was being written, or reserved, when a process was killed."""
         for name in WHOLE:
             unfinished(self.path / name).unlink(missing_ok=True)
 

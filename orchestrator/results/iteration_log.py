@@ -25,8 +25,9 @@ class IterationLog:
         self._table = Table(folder / ITERATIONS, columns, resumed)
 
     def accept(self, step: Accepted, exchange: Exchange) -> None:
-        """See Observer."""
-        self._add(step.time_ms, step.sweeps)
+        """See Observer; the sweeps that made initial values agree are those of no step."""
+        if step.number:
+            self._add(step.time_ms, step.sweeps)
 
     def failed(self, time_ms: float, sweeps: Sweeps) -> None:
         """Add the sweeps of a step to `time_ms` that was not accepted."""

@@ -1,18 +1,22 @@
 """One run at a time in a folder."""
 
 import os
+import time
 from contextlib import suppress
 from pathlib import Path
 
 from filelock import lock_descriptor
 
 from ..errors import InputError
-from .writing import allowed
+from ..writing import allowed
 
 _NAME = ".lock"
 
 #: How often a folder or its lock may vanish under our hands, because another run ends, before we give up.
 _ATTEMPTS = 100
+
+#: How long a folder may still be in use before we say so, in seconds: a process that was killed takes a moment to go.
+_PATIENCE_S, _PAUSE_S = 1.0, 0.02
 
 
 class FolderLock:
@@ -48,7 +52,7 @@ class FolderLock:
             except FileNotFoundError:
                 continue
             try:
-                if not lock_descriptor(descriptor, blocking=False):
+                if not _locked(descriptor):
                     holder = os.pread(descriptor, 20, 0).decode(errors="replace").strip()
                     who = f"process {holder}" if holder else "another process"
                     raise InputError(
@@ -76,3 +80,13 @@ class FolderLock:
             return os.path.samestat(os.fstat(descriptor), os.stat(self._path))
         except FileNotFoundError:
             return False
+
+
+def _locked(descriptor: int) -> bool:
+    """Lock a file for this process, if that is possible within a moment."""
+    until = time.monotonic() + _PATIENCE_S
+    while not lock_descriptor(descriptor, blocking=False):
+        if time.monotonic() > until:
+            return False
+        time.sleep(_PAUSE_S)
+    return True

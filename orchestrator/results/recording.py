@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from ..assembly import Assembly
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
-from ..errors import InputError, Interrupted, RunError
+from ..errors import InputError, Interrupted, RunError, Terminated
 from ..wall_clock import WallClock
 from .appended import check
 from .checkpoint import Checkpoint, Memories
@@ -26,6 +27,7 @@ from .time_series import TimeSeries
 
 #: How a run ended, by the exception that ended it; any other is a crash.
 _STATUS: dict[type[BaseException], str] = {
+    Terminated: "terminated",
     RunError: "failed",
     InputError: "failed",
     Interrupted: "interrupted",
@@ -62,6 +64,7 @@ class Recording:
         wall: Callable[[Mapping[str, Any] | None], WallClock],
     ) -> None:
         self.summary: dict[str, Any] = {}
+        self._refusal: RunError | None = None
         self._folder, self._origin, self._assembly = folder, origin, assembly
         kept = before or {}
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
@@ -79,9 +82,11 @@ class Recording:
                 self._fields = add("fields", Fields(folder, participants, assembly.mesh, kept.get("fields")))
             series = TimeSeries(folder, participants, assembly.probes, kept.get("series"))
             self._series: TimeSeries = add("series", series)
-            self._log: CouplingLog = add("log", CouplingLog(folder, master.units, assembly.converged, kept.get("log")))
-            if assembly.converged:
-                self._iterations = add("iterations", IterationLog(folder, assembly.converged, kept.get("iterations")))
+            converged, adaptive = list(assembly.converged), scenario.coupling.adaptive is not None
+            log = CouplingLog(folder, master.units, converged, adaptive, kept.get("log"))
+            self._log: CouplingLog = add("log", log)
+            if converged:
+                self._iterations = add("iterations", IterationLog(folder, converged, kept.get("iterations")))
             self._profile = opened.enter_context(closing(Profile(folder, list(participants))))
             self._wall = wall(kept.get("wall"))
             opened.pop_all()
@@ -113,7 +118,8 @@ class Recording:
             if self._keeps and step.number and step.number % self._every == 0:
                 self._checkpoint.write()
         except OSError as error:
-            raise self._refused(error) from error
+            self._refusal = self._refused(error)
+            raise self._refusal from error
 
     def keep(self) -> None:
         """Write a checkpoint of this moment, between two steps, where the units can be kept."""
@@ -121,7 +127,8 @@ class Recording:
             if self._keeps:
                 self._checkpoint.write()
         except OSError as error:
-            raise self._refused(error) from error
+            self._refusal = self._refused(error)
+            raise self._refusal from error
 
     def __enter__(self) -> "Recording":
         return self
@@ -134,7 +141,12 @@ class Recording:
         ending = self._ending(error, problems)
         done = ending is None
         resumable = self._checkpoint.exists and not done
-        outcome = _outcome(ending) | {"unconverged_ms": self._log.unconverged, "resumable": resumable}
+        outcome = _outcome(ending) | {
+            "unconverged_ms": self._log.unconverged,
+            "tolerance_missed": asdict(self._assembly.master.missed),
+            "resumable": resumable,
+            "warnings": list(self._assembly.warnings),
+        }
         scenario, seconds = self._assembly.scenario, self._wall.seconds()
         path = self._folder / SUMMARY
         try:
@@ -169,9 +181,10 @@ class Recording:
 
     def _ending(self, error: BaseException | None, problems: list[Exception]) -> BaseException | None:
         """What a run ends with that ended with `error` and whose files then had these problems."""
-        if not problems:
-            return error
         bugs = [problem for problem in problems if not isinstance(problem, OSError)]
+        # Where the operating system has refused once, nobody need be told of every file again.
+        if not problems or (error is self._refusal is not None and not bugs):
+            return error
         if isinstance(error, RunError):
             return RunError(f"{error}; besides, {'; '.join(_told(problem) for problem in problems)}")
         if error is None or isinstance(error, Interrupted):
@@ -182,10 +195,10 @@ class Recording:
 
     def _refused(self, error: Exception) -> RunError:
         rows = self._series.rows
-        reached = f" The results up to {rows[-1][0]:g} ms are complete;" if rows else ""
+        reached = f". The results up to {rows[-1][0]:g} ms are complete" if rows else ""
         return RunError(
-            f"the results cannot be written: {_told(error)}.{reached} make room, or give back what was taken away, and "
-            "go on with --resume"
+            f"the results cannot be written ({_told(error)}){reached}; make room, or give back what was taken away, "
+            "and go on with --resume"
         )
 
 

@@ -21,6 +21,8 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
     "activation_time_ms": dict,
     "ejection_fraction": dict,
     "unconverged_ms": list,
+    "tolerance_missed": dict,
+    "warnings": list,
     "wall_s": dict,
 }
 

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -18,12 +18,22 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         yield part
         os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
+    except BaseException as error:
+        with suppress(OSError):
+            part.unlink()
+        # Refusals to write do not say to what.
+        if isinstance(error, OSError) and error.filename is None:
+            raise OSError(error.errno, error.strerror, str(path)) from None
         raise
+
+
+def reserve(path: Path, size: int) -> None:
+    """Take the space now that `write_whole` needs later for so many bytes, when there may be none left."""
+    unfinished(path).write_bytes(bytes(size))
 
 
 def write_whole(path: Path, content: bytes) -> None:
     """Put a file of this `content` in the place of what is at `path`."""
-    with replacing(path) as part:
-        part.write_bytes(content)
+    with replacing(path) as part, part.open("r+b" if part.exists() else "wb") as file:
+        file.write(content)
+        file.truncate()

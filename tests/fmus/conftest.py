@@ -39,27 +39,34 @@ Fields = dict[str, np.ndarray]
 
 
 def _tiny() -> Mesh:
-    """The wall between two pyramids that stand on their heads: 4 + 1 nodes inside, 4 + 1 outside, 12 elements."""
+    """Two ventricles of 16 nodes and 24 elements: the left one is the wall between two pyramids on their heads.
+
+    A second layer runs around it and leaves it on the right, where it encloses the other cavity.
+    """
     corners = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], dtype=float)
-    points = np.vstack([20 * corners, [[0, 0, -50]], 30 * corners, [[0, 0, -65]]])
+    outer = 40 * corners + [[20.0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]
+    points = np.vstack([20 * corners, [[0, 0, -50]], 30 * corners, [[0, 0, -60]], outer, [[0, 0, -70]], [[50, 0, 0]]])
+    inner_wall = [((side, (side + 1) % 4, 4), 5) for side in range(4)]
+    around = [((15, 6, 9), 5), ((6, 7, 9), 5), ((7, 8, 9), 5), ((8, 15, 9), 5)]
     cells = []
-    for side in range(4):
+    for triangle, further in (*inner_wall, *around):
         # A prism cut in the order of its node numbers, so that neighbours agree on the diagonal between them.
-        a, b, c = sorted((side, (side + 1) % 4, 4))
-        cells += [[a, b, c, c + 5], [a, b, b + 5, c + 5], [a, a + 5, b + 5, c + 5]]
+        a, b, c = sorted(triangle)
+        beyond = {node: 10 if node == 15 else node + further for node in triangle}
+        cells += [[a, b, c, beyond[c]], [a, b, beyond[b], beyond[c]], [a, beyond[a], beyond[b], beyond[c]]]
     numbers = np.array(cells)
     inverted = np.linalg.det(points[numbers[:, 1:]] - points[numbers[:, :1]]) < 0.0
     numbers[inverted] = numbers[inverted][:, [0, 2, 1, 3]]
     surface = Mesh(points, numbers).surface
-    inside, outside = (surface < 5).all(axis=1), (surface >= 5).all(axis=1)
-    left = points[surface].mean(axis=1)[:, 0] < 0.0
+    base = (points[surface, 2] == 0.0).all(axis=1)
+    inside, outside = (surface < 5).all(axis=1), ((surface >= 10) & (surface < 15)).all(axis=1)
+    free = (surface == 15).any(axis=1) & ~base
     boundaries = {
-        "base": surface[~inside & ~outside],
+        "base": surface[base],
         "lv_endocardium": surface[inside],
         "epicardium": surface[outside],
-        # No second chamber; but its boundaries have to be there, open at the base only.
-        "rv_endocardium": surface[outside & left],
-        "rv_septum": surface[outside & ~left],
+        "rv_endocardium": surface[free],
+        "rv_septum": surface[~(base | inside | outside | free)],
     }
     return Mesh(points, numbers, boundaries)
 
@@ -118,7 +125,7 @@ def _cases(mesh: Mesh) -> dict[str, Case]:
 
 @pytest.fixture(scope="session")
 def tiny() -> Mesh:
-    """The smallest mesh with all boundaries: 10 nodes, 12 elements."""
+    """A very small mesh with all boundaries: 16 nodes, 24 elements."""
     return _tiny()
 
 

@@ -119,7 +119,8 @@ def test_any_other_content_is_another_file(tiny: Mesh, monkeypatch: pytest.Monke
         build.fingerprint(_UNIT, _changed(tiny, lid=tiny.boundary("base"))),
         build.fingerprint(_UNIT, _changed(tiny, base=tiny.boundary("base")[1:])),
         build.fingerprint(
-            _UNIT, _changed(tiny, rv_septum=tiny.boundary("rv_endocardium"), rv_endocardium=tiny.boundary("rv_septum"))
+            _UNIT,
+            _changed(tiny, lv_endocardium=tiny.boundary("epicardium"), epicardium=tiny.boundary("lv_endocardium")),
         ),
     }
     _other_code(monkeypatch)

@@ -268,7 +268,7 @@ def test_a_field_of_the_wrong_shape_is_refused(fmus: dict, tiny: Mesh, join: Cal
     participant = _ready(join(fmus["active_stress"]))
     # NumPy would spread the first two over all nodes.
     for values in (np.array(20.0), np.full(1, 20.0), np.full(tiny.nodes + 1, 20.0)):
-        with pytest.raises(ParticipantError, match=r"'potential' of unit 'guest' got shape .*expected \(10,\)"):
+        with pytest.raises(ParticipantError, match=r"'potential' of unit 'guest' got shape .*expected \(16,\)"):
             participant.set("potential", values)
 
 

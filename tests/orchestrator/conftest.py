@@ -38,6 +38,9 @@ class Fake:
     calls: list[tuple[Any, ...]] = field(default_factory=list)
     #: The law gets the inputs at the step's begin as well.
     ramps: bool = False
+    memoryless: bool = False
+    #: From the inputs, the outputs in initialization mode; they stay as they begin if not given.
+    initially: Law | None = None
 
     def __post_init__(self) -> None:
         self.inputs = Ports({port.name: port for port in self.inputs})
@@ -46,6 +49,7 @@ class Fake:
         self._in: dict[str, Values] = {name: np.zeros(port.shape) for name, port in self.inputs.items()}
         self._out: dict[str, Values] = {name: np.zeros(port.shape) for name, port in self.outputs.items()}
         self._ramps: dict[str, Ramp] = {}
+        self._initialising = False
         self._take(self.begins)
 
     def _take(self, values: Mapping[str, Any]) -> None:
@@ -55,9 +59,12 @@ class Fake:
 
     def begin(self) -> None:
         self.calls.append((self.name, "begin"))
+        self._initialising = True
 
     def complete(self) -> None:
         self.calls.append((self.name, "complete"))
+        self._follow()
+        self._initialising = False
 
     def set(self, name: str, values: Values) -> None:
         if name not in self.inputs:
@@ -67,7 +74,12 @@ class Fake:
         self.calls.append((self.name, "set", name, values.tolist()))
         self._in[name] = values
 
+    def _follow(self) -> None:
+        if self._initialising and self.initially is not None:
+            self._take(self.initially(self._in))
+
     def get(self, name: str) -> Values:
+        self._follow()
         if name not in self._out:
             return self.outputs.element(name, self._out.__getitem__)
         return self._out[name].copy()
@@ -86,7 +98,7 @@ class Fake:
 
     @property
     def abilities(self) -> Abilities:
-        return Abilities(ramps=self.ramps)
+        return Abilities(ramps=self.ramps, memoryless=self.memoryless)
 
     def save(self) -> Any:
         self.calls.append((self.name, "save"))

@@ -469,7 +469,7 @@ def test_an_fmu_of_another_mesh_does_not_fit(
     cosim: Cosim, small_scenario: Path, small_heart, built: Path, tmp_path: Path
 ) -> None:
     keep = np.ones(small_heart.elements, dtype=bool)
-    # Without one corner element on the base the mesh is another one; the nodes all remain.
+    # Without one inner element the mesh is another one; the nodes all remain.
     corner = next(
         number
         for number in range(small_heart.elements)
@@ -482,9 +482,9 @@ def test_an_fmu_of_another_mesh_does_not_fit(
         )
     )
     keep[corner] = False
-    write_mesh(
-        type(small_heart)(small_heart.points, small_heart.cells[keep], small_heart.boundaries), tmp_path / "o.msh"
-    )
+    hole = small_heart.cells[corner][[[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]]
+    boundaries = dict(small_heart.boundaries) | {"epicardium": np.vstack([small_heart.boundary("epicardium"), hole])}
+    write_mesh(type(small_heart)(small_heart.points, small_heart.cells[keep], boundaries), tmp_path / "o.msh")
     ended = cosim(
         "run",
         small_scenario,

@@ -1,6 +1,7 @@
 """If this failed, iterated coupling would stop too early, never, or at values that are no solution of the loop."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from cardiac_cosim.orchestrator.coupling.master import Accepted, Master
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
 from cardiac_cosim.orchestrator.coupling.timeline import Timeline
 from cardiac_cosim.orchestrator.errors import RunError
+from cardiac_cosim.orchestrator.run import run_scenario
+from cardiac_cosim.orchestrator.scenario import load_scenario
 
 
 class _Watch:
@@ -207,12 +210,124 @@ def test_measures_on_both_sides_of_their_limits(criterion: Criterion, limit: flo
     assert not criterion.met(1.001 * limit, value=20.0, first=4.0)
 
 
-def test_a_field_without_a_criterion_is_measured_and_not_judged() -> None:
-    convergence = Convergence({"a.y": Criterion(absolute=1.0)})
-    values = {"a.y": np.ones(2), "b.x": np.ones(2)}
-    assert convergence.judge({"a.y": np.zeros(2), "b.x": np.full(2, 1e9)}, values)
-    assert convergence.history[-1]["b.x"] > 1e9
-    assert convergence.contraction_rate is None
+@pytest.mark.parametrize(
+    ("criterion", "limit"),
+    [
+        (Criterion(relative=0.2), 0.2),
+        # 4e-4 of a field of 2 are two in ten thousand; a tenth of a first residual of 1 is more than three digits.
+        (Criterion(absolute=4e-4), 2e-4),
+        (Criterion(residual_relative=0.1), 1e-3),
+        (Criterion(absolute=4e-4, relative=0.2), 0.2),
+    ],
+)
+def test_a_field_that_sweeps_start_from_is_judged_by_the_criteria_of_the_others(
+    criterion: Criterion, limit: float
+) -> None:
+    def judged(residual: float, carried: list[str]) -> bool:
+        convergence = Convergence({"a.y": criterion}, carried)
+        values = {"a.y": np.array([2.0]), "b.x": np.array([3.0, 4.0])}
+        convergence.judge({"a.y": np.ones(1), "b.x": np.ones(2)}, values)
+        return convergence.judge({"a.y": np.zeros(1), "b.x": np.array([residual, 0.0])}, values)
+
+    # Its magnitude over the step is 5, the norm of (3, 4).
+    assert judged(0.99 * limit * 5.0, ["b.x"])
+    assert not judged(1.01 * limit * 5.0, ["b.x"])
+    # One that is computed anew in every sweep is measured only.
+    assert judged(1e9, [])
+
+
+@pytest.mark.parametrize("named", ["a.x", "b.y", "c.z"])
+@pytest.mark.parametrize("scheme", ["jacobi", "gauss-seidel"])
+def test_a_loop_is_not_accepted_before_a_change_has_come_round(named: str, scheme: str, fake: Any, port: Any) -> None:
+    # x = 0.5 z + 1 jumps in the first sweep, and y = x, z = y hear of it one sweep later each.
+    units = {
+        "a": fake("a", [port("z")], [port("x")], law=lambda given, *_: {"x": 0.5 * given["z"] + 1.0}),
+        "b": fake("b", [port("x")], [port("y")], law=lambda given, *_: {"y": given["x"]}),
+        "c": fake("c", [port("y")], [port("z")], law=lambda given, *_: {"z": given["y"]}),
+    }
+    connections = connect(units, [])
+    limits = Limits({named: Criterion(relative=1e-8)}, 200, True)
+    iterated = Iterated(SCHEMES[scheme](), units, connections, Relaxation(1.0), limits)
+    master = Master(units, connections, iterated, Timeline.of_fixed_step(1.0, 1.0, 1.0))
+    master.run([])
+    for unit, name in (("a", "x"), ("b", "y"), ("c", "z")):
+        assert float(master.exchange.value(unit, name)) == pytest.approx(2.0, rel=1e-6)
+
+
+def test_both_schemes_agree_on_a_heart_whatever_field_is_named(small_scenario: Path, tmp_path: Path) -> None:
+    def volume(scheme: str, field: str) -> np.ndarray:
+        iterate = f"coupling.iterate={{acceleration: anderson, converge: {{{field}: {{relative: 1e-6}}}}}}"
+        linear = ["coupling.interpolation=linear", "coupling.extrapolation=1", "coupling.step_ms=5", "run.stop_ms=40"]
+        scenario = load_scenario(small_scenario, [iterate, *linear, f"coupling.scheme={scheme}"])
+        outcome = run_scenario(scenario, tmp_path, tmp_path / f"{scheme} {field}")
+        return np.genfromtxt(outcome.folder / "timeseries.csv", delimiter=",", names=True)["lv_volume_ml"]
+
+    expected = volume("gauss-seidel", "stretch")
+    assert np.ptp(expected) > 1.0
+    for scheme, field in (("jacobi", "stretch"), ("jacobi", "potential"), ("gauss-seidel", "active_stress")):
+        np.testing.assert_allclose(volume(scheme, field), expected, atol=2e-3, err_msg=f"{scheme}, {field}")
+
+
+# --- initial values -----------------------------------------------------------------------------------------------
+
+
+def _feedthrough(fake: Any, port: Any, late: bool = False) -> dict[str, Any]:
+    """b.in = 0.5 a.out + 1, a.in = b.out, at once; where `late`, b's output follows only after the initialisation."""
+
+    def half(given: Any, *_: Any) -> dict[str, Any]:
+        return {"y": 0.5 * given["x"] + 1.0}
+
+    def same(given: Any, *_: Any) -> dict[str, Any]:
+        return {"x": given["y"]}
+
+    units = {
+        "a": fake("a", [port("x")], [port("y")], law=half, initially=half),
+        "b": fake("b", [port("y")], [port("x")], law=same, initially=same),
+    }
+    if late:
+        units["b"].initially = lambda given: same(given) if units["b"].calls[-1][1] == "complete" else {"x": 0.0}
+    return units
+
+
+@pytest.mark.parametrize("acceleration", [Relaxation(1.0), Anderson(1.0)])
+def test_initial_values_of_an_iterated_loop_agree(
+    acceleration: Acceleration, fake: Any, port: Any, master: Any
+) -> None:
+    units = _feedthrough(fake, port)
+    _, (first, *_) = _run(units, acceleration=acceleration)
+    assert first.sweeps.converged
+    # It ended with the initial values, not with those of the step after: both are at their solution from the begin on.
+    before = [call for call in units["b"].calls[: units["b"].calls.index(("b", "complete"))] if call[1] == "set"]
+    assert before[-1][3] == pytest.approx(2.0, abs=1e-9)
+    explicit = master(_feedthrough(fake, port))
+    explicit.initialise()
+    assert [float(explicit.exchange.value(unit, name)) for unit, name in (("a", "y"), ("b", "x"))] == [1.0, 1.0]
+
+
+def test_outputs_that_follow_only_after_the_initialisation_are_no_agreement(fake: Any, port: Any) -> None:
+    _, (first, *_) = _run(_feedthrough(fake, port, late=True))
+    assert not first.sweeps.converged
+
+
+def test_a_loop_without_initial_values_fails_at_the_initialisation(fake: Any, port: Any) -> None:
+    units = _feedthrough(fake, port)
+    units["a"].initially = lambda given: {"y": 1.0 - 3.0 * given["x"]}
+    with pytest.raises(
+        RunError, match=r"^the coupling failed at its initialisation: no convergence in 50 sweeps: b\.x"
+    ):
+        _run(units)
+
+
+# --- failures -----------------------------------------------------------------------------------------------------
+
+
+def test_the_sweeps_of_a_step_that_fails_are_kept(loop: Any) -> None:
+    with pytest.raises(RunError) as failure:
+        _run(loop(2.0), limit=7)
+    assert failure.value.time_ms == 1.0
+    norms = [sweep["b.x"] for sweep in failure.value.sweeps.loops[0].history]
+    assert len(norms) == 7
+    assert norms == sorted(norms)
 
 
 def test_a_loop_that_fails_says_when_and_that_earlier_results_stand(loop: Any) -> None:

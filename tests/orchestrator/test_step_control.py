@@ -11,10 +11,17 @@ import pytest
 from cardiac_cosim.orchestrator.coupling.connections import connect
 from cardiac_cosim.orchestrator.coupling.exchange import Exchange, Inputs
 from cardiac_cosim.orchestrator.coupling.master import Accepted, Master
-from cardiac_cosim.orchestrator.coupling.schemes import GaussSeidel
-from cardiac_cosim.orchestrator.coupling.step_control import AdaptiveStep, FixedStep
+from cardiac_cosim.orchestrator.coupling.missed_tolerance import Missed
+from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES, GaussSeidel
+from cardiac_cosim.orchestrator.coupling.step_control import AdaptiveStep, FixedStep, Verdict
 from cardiac_cosim.orchestrator.coupling.timeline import Timeline
-from cardiac_cosim.orchestrator.errors import ParticipantError, RunError
+from cardiac_cosim.orchestrator.errors import (
+    ParticipantError,
+    ParticipantLost,
+    ParticipantTerminated,
+    RunError,
+    Terminated,
+)
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 
@@ -35,9 +42,9 @@ class _RefusesOnce(FixedStep):
     def __init__(self) -> None:
         self._again = False
 
-    def good(self, exchange: Exchange, ticks: int) -> bool:
+    def judge(self, exchange: Exchange, ticks: int) -> Verdict:
         self._again = not self._again
-        return not self._again
+        return Verdict(not self._again)
 
 
 # --- the time axis ------------------------------------------------------------------------------------------------
@@ -110,7 +117,7 @@ def test_a_unit_that_fails_in_a_long_step_is_given_a_shorter_one(fake: Any, port
     time = Timeline.of_shortest_step(0.5, 20.0, 10.0)
     units = {"a": fake("a", outputs=[port("x")], law=law), "b": fake("b", [port("x")])}
     watch = _Watch()
-    control = AdaptiveStep(time, 1e6, 0.5, 10.0, 5.0)
+    control = AdaptiveStep(time, 1e6, 0.5, 10.0, 5.0, units)
     Master(units, connect(units, []), GaussSeidel(), time, inputs=Inputs(depth=2), control=control).run([watch])
     assert watch.steps[-1].time_ms == 20.0
     assert sum(step.rejected for step in watch.steps) >= 2
@@ -123,7 +130,7 @@ def test_a_unit_that_fails_in_a_long_step_is_given_a_shorter_one(fake: Any, port
         raise ParticipantError("never")
 
     units["a"].law = hopeless
-    control = AdaptiveStep(time, 1e6, 0.5, 10.0, 5.0)
+    control = AdaptiveStep(time, 1e6, 0.5, 10.0, 5.0, units)
     with pytest.raises(RunError, match=r"unit 'a' failed in the step from 0 to 0\.5 ms: never"):
         Master(units, connect(units, []), GaussSeidel(), time, inputs=Inputs(depth=2), control=control).run([])
 
@@ -139,14 +146,16 @@ def _decay(fake: Any, port: Any) -> dict[str, Any]:
 
     return {
         "a": fake("a", [port("u")], [port("y")], law=fall, begins={"y": 1.0}, ramps=True),
-        "b": fake("b", [port("y")], [port("u")], law=lambda given, *_: {"u": given["y"]}, begins={"u": 1.0}),
+        "b": fake(
+            "b", [port("y")], [port("u")], law=lambda given, *_: {"u": given["y"]}, begins={"u": 1.0}, memoryless=True
+        ),
     }
 
 
 def test_adaptive_steps_grow_with_the_calm_hit_outputs_and_keep_to_their_limits(fake: Any, port: Any) -> None:
     time = Timeline.of_shortest_step(0.1, 100.0, 25.0)
     units, watch = _decay(fake, port), _Watch()
-    control = AdaptiveStep(time, 1e-3, 0.1, 12.0, 0.1)
+    control = AdaptiveStep(time, 1e-3, 0.1, 12.0, 0.1, units)
     Master(units, connect(units, []), GaussSeidel(), time, inputs=Inputs(1, True, 2), control=control).run([watch])
     steps = watch.steps[1:]
     assert [step.time_ms for step in steps if step.is_output] == [25.0, 50.0, 75.0, 100.0]
@@ -162,7 +171,7 @@ def test_the_error_of_an_adaptive_run_follows_its_tolerance(fake: Any, port: Any
     errors, counts = [], []
     for tolerance in (1e-2, 1e-3, 1e-4):
         units, watch = _decay(fake, port), _Watch()
-        control = AdaptiveStep(time, tolerance, 0.01, 50.0, 0.1)
+        control = AdaptiveStep(time, tolerance, 0.01, 50.0, 0.1, units)
         master = Master(units, connect(units, []), GaussSeidel(), time, inputs=Inputs(1, True, 2), control=control)
         master.run([watch])
         errors.append(abs(float(master.exchange.value("a", "y")) - np.exp(-5.0)))
@@ -176,7 +185,7 @@ def test_a_control_resumed_goes_on_as_it_would_have(fake: Any, port: Any) -> Non
 
     def master() -> Master:
         units = _decay(fake, port)
-        control = AdaptiveStep(time, 1e-3, 0.1, 12.0, 0.1)
+        control = AdaptiveStep(time, 1e-3, 0.1, 12.0, 0.1, units)
         return Master(units, connect(units, []), GaussSeidel(), time, inputs=Inputs(1, True, 2), control=control)
 
     class Stop(_Watch):
@@ -191,6 +200,156 @@ def test_a_control_resumed_goes_on_as_it_would_have(fake: Any, port: Any) -> Non
     second.run([rest])
     times = [step.time_ms for step in (*watch.steps, *rest.steps)]
     assert times == [step.time_ms for step in whole.steps]
+
+
+def _adaptive(
+    units: dict[str, Any], stop_ms: float, tolerance: float, min_ms: float, scheme: str = "gauss-seidel", **rest: Any
+) -> tuple[Master, _Watch]:
+    """A run of adaptive steps, the first of them as short as possible."""
+    time, watch = Timeline.of_shortest_step(min_ms, stop_ms, stop_ms), _Watch()
+    control = AdaptiveStep(time, tolerance, min_ms, stop_ms, min_ms, units)
+    inputs = rest.pop("inputs", Inputs(1, True, 2))
+    master = Master(units, connect(units, []), SCHEMES[scheme](), time, inputs=inputs, control=control, **rest)
+    master.run([watch])
+    return master, watch
+
+
+def _clock_into_integrator(fake: Any, port: Any, ramps: bool) -> dict[str, Any]:
+    """y' = u with u = t in seconds: y(t) = t²/2; the integrator holds u at the step's end, unless it `ramps`."""
+
+    def integrate(end: Any, state: Any, time: float, size: float, begin: Any = None) -> Mapping[str, float]:
+        mean = end["u"] if begin is None else 0.5 * (begin["u"] + end["u"])
+        return {"y": float(state["y"]) + size * float(mean)}
+
+    return {
+        "clock": fake("clock", outputs=[port("u")], law=lambda given, before, time, size: {"u": time + size}),
+        "integrator": fake("integrator", [port("u")], [port("y")], law=integrate, ramps=ramps),
+    }
+
+
+def test_inputs_that_are_held_are_judged_by_what_holding_does_to_them(fake: Any, port: Any) -> None:
+    # The clock is on its line, whatever the step; one step of 10 s, held, would end at 100 instead of 50.
+    errors, steps = [], []
+    for tolerance in (4e-2, 2e-2, 1e-2):
+        units = _clock_into_integrator(fake, port, ramps=False)
+        master, watch = _adaptive(units, 10_000.0, tolerance, 10.0)
+        errors.append(float(master.exchange.value("integrator", "y")) - 50.0)
+        steps.append(len(watch.steps))
+        assert master.missed.steps == 0
+    assert errors[0] < 5.0
+    # Of first order: half the error for twice the steps.
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=0.35)
+    np.testing.assert_allclose(np.divide(steps[1:], steps[:-1]), 2.0, rtol=0.35)
+    master, watch = _adaptive(_clock_into_integrator(fake, port, ramps=True), 10_000.0, 1e-2, 10.0)
+    assert float(master.exchange.value("integrator", "y")) == pytest.approx(50.0, rel=1e-12)
+    assert len(watch.steps) < min(steps) / 3
+
+
+def test_a_tolerance_that_is_missed_at_the_shortest_step_is_counted(fake: Any, port: Any) -> None:
+    master, watch = _adaptive(_clock_into_integrator(fake, port, ramps=False), 10_000.0, 1e-6, 100.0)
+    assert float(master.exchange.value("integrator", "y")) > 50.1
+    judged = watch.steps[2:]
+    assert all(step.missed and step.error is not None and step.error > 1e3 for step in judged)
+    assert master.missed == Missed(len(judged), judged[0].time_ms)
+
+
+def test_a_step_that_was_too_long_by_what_was_known_only_then_is_not_counted(fake: Any, port: Any) -> None:
+    # In its second step everything has moved by what it moved then: any tolerance is missed.
+    units = _clock_into_integrator(fake, port, ramps=False)
+    master, watch = _adaptive(units, 10_000.0, 2e-2, 100.0)
+    assert [step.missed for step in watch.steps].count(True) >= 2
+    assert master.missed == Missed()
+
+
+def test_extrapolated_inputs_are_judged_by_what_they_were_and_not_by_the_line(fake: Any, port: Any) -> None:
+    def error(scheme: str) -> float:
+        units = _clock_into_integrator(fake, port, ramps=True)
+        master, _ = _adaptive(units, 10_000.0, 1e-2, 1.0, scheme, inputs=Inputs(0, True, 2))
+        return abs(float(master.exchange.value("integrator", "y")) - 50.0)
+
+    # Under Jacobi without extrapolation the end of a ramp is the value of the step before.
+    assert error("gauss-seidel") < 1e-9
+    assert 1e-3 < error("jacobi") < 1.0
+
+
+def test_a_refused_step_leaves_no_trace_in_the_scale_of_the_errors(fake: Any, port: Any) -> None:
+    # A step longer than 2 ms overshoots a thousandfold, and is refused: the steps after it are those without it.
+    def run(outlier: float) -> list[float]:
+        def law(given: Any, before: Any, time: float, size: float) -> Mapping[str, float]:
+            end = 1e3 * (time + size)
+            return {"x": np.sin(end / 10.0) + (outlier if size > 2.1e-3 else 0.0)}
+
+        units = {"a": fake("a", outputs=[port("x")], law=law), "b": fake("b", [port("x")], memoryless=True)}
+        time, watch = Timeline.of_shortest_step(0.25, 30.0, 30.0), _Watch()
+        control = AdaptiveStep(time, 0.1, 0.25, 4.0, 0.25, units)
+        inputs = Inputs(1, True, 2)
+        Master(units, connect(units, []), GaussSeidel(), time, inputs=inputs, control=control).run([watch])
+        outliers = [step for step in watch.steps if step.rejected]
+        assert outliers or not outlier
+        return [step.error for step in watch.steps if step.error is not None]
+
+    # If the outlier had widened the scale, errors after it would be a thousandth of these.
+    assert np.median(run(1e3)) > 0.1 * np.median(run(0.0))
+
+
+def test_a_unit_that_waits_is_not_judged_by_what_it_was(fake: Any, port: Any) -> None:
+    def units() -> dict[str, Any]:
+        return {
+            "slow": fake("slow", [], [port("y")], law=lambda given, before, time, size: {"y": time + size}),
+            "fast": fake("fast", [port("y")], [port("z")], law=lambda given, *_: {"z": given["y"]}, ramps=True),
+        }
+
+    _, often = _adaptive(units(), 1_000.0, 1e-2, 1.0)
+    _, seldom = _adaptive(units(), 1_000.0, 1e-2, 1.0, every={"slow": 4})
+    # On a line nothing is ever wrong, so that steps grow, however seldom the unit steps that gives it.
+    assert len(seldom.steps) <= 2 * len(often.steps)
+
+
+# --- units that fail, or end -------------------------------------------------------------------------------------
+
+
+def _failing_master(fake: Any, port: Any, law: Any) -> Master:
+    units = {"a": fake("a", outputs=[port("x")], law=law), "b": fake("b", [port("x")])}
+    time = Timeline.of_shortest_step(0.5, 20.0, 10.0)
+    control = AdaptiveStep(time, 1e6, 0.5, 10.0, 5.0, units)
+    return Master(units, connect(units, []), GaussSeidel(), time, inputs=Inputs(depth=2), control=control)
+
+
+def test_why_a_unit_failed_in_longer_steps_is_told_once_the_shortest_fails(fake: Any, port: Any) -> None:
+    def law(given: Any, before: Any, time: float, size: float) -> Mapping[str, float]:
+        raise ParticipantError("the valve is stuck" if size > 1e-3 else "no solution")
+
+    with pytest.raises(RunError) as failure:
+        _failing_master(fake, port, law).run([])
+    text = str(failure.value)
+    assert text.startswith("unit 'a' failed in the step from 0 to 0.5 ms: no solution; before that unit 'a' failed in ")
+    assert text.count("the valve is stuck") == 1
+
+
+def test_why_a_unit_failed_is_told_when_it_cannot_go_back_either(fake: Any, port: Any) -> None:
+    def law(given: Any, before: Any, time: float, size: float) -> Mapping[str, float]:
+        raise ParticipantError("the valve is stuck")
+
+    master = _failing_master(fake, port, law)
+
+    def refused(state: Any) -> None:
+        raise ParticipantError("fmi2SetFMUstate failed")
+
+    master.participants["a"].restore = refused  # type: ignore[method-assign]
+    master.participants["a"].free = refused  # type: ignore[method-assign]
+    with pytest.raises(RunError, match=r"fmi2SetFMUstate failed; before that unit 'a' failed .* the valve is stuck"):
+        master.run([])
+
+
+@pytest.mark.parametrize(("error", "kind"), [(ParticipantLost, RunError), (ParticipantTerminated, Terminated)])
+def test_a_unit_that_is_gone_or_at_its_end_is_not_tried_again(error: Any, kind: Any, fake: Any, port: Any) -> None:
+    def law(given: Any, before: Any, time: float, size: float) -> Mapping[str, float]:
+        raise error("enough")
+
+    master = _failing_master(fake, port, law)
+    with pytest.raises(kind, match=r"unit 'a' .*enough"):
+        master.run([])
+    assert [call[1] for call in master.participants["a"].calls].count("step") == 1  # type: ignore[attr-defined]
 
 
 # --- units that step less often -----------------------------------------------------------------------------------

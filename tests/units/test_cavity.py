@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from cardiac_cosim.units.errors import InvalidInput
 from cardiac_cosim.units.geometry.biventricle import Biventricle
-from cardiac_cosim.units.mechanics.cavity import Cavity
 from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.mesh.cavity import Cavity
 
 _LV, _RV = ("lv_endocardium",), ("rv_endocardium", "rv_septum")
 

@@ -306,18 +306,12 @@ def block(box, along):
 
     def make(cells: int) -> tuple[Mesh, dict[str, np.ndarray]]:
         axis = np.linspace(0.0, 10.0, cells + 1)
-
-        def wall(at: np.ndarray) -> np.ndarray:
-            return at[:, 2] < -0.01
-
         mesh = box(
             axis,
             axis,
             axis - 10.0,
             base=lambda at: at[:, 2] > -0.01,
-            lv_endocardium=wall,
-            rv_endocardium=wall,
-            rv_septum=wall,
+            endocardium=lambda at: at[:, 1] < 0.01,
         )
         return mesh, {"fiber": along(mesh, (0, 0.6, 0.8)), "sheet": along(mesh, (1, 0, 0))}
 

@@ -1,11 +1,14 @@
 """The time scale β_t of the ionic model, by the expected time of activation (model.md, Electrophysiology)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import FloatArray
 from ..errors import InvalidInput
+from ..mesh import Mesh
+from ..mesh.frame import apex_warnings
 from ..variable import parameter
 
 
@@ -30,6 +33,11 @@ class TimeScale:
         "expected activation time along Z: last_first grows towards the apex, seed towards the base",
         choices=("last_first", "seed"),
     )
+
+    def warnings(self, mesh: Mesh) -> Iterator[str]:
+        """See Placed; without a reduction no place matters."""
+        if self.time_scale_reduction:
+            yield from apex_warnings(mesh, self.apex_z_mm)
 
     def __call__(self, z: FloatArray) -> FloatArray:
         """β_t in ms at the heights `z` in mm; InvalidInput where it is not positive."""

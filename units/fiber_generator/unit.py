@@ -11,11 +11,14 @@ How it fails: a mesh without the named boundaries, or with elements through whos
 refused with InvalidInput.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import FloatArray
+from ..mesh import Mesh
+from ..mesh.frame import apex_warnings
 from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
@@ -36,6 +39,10 @@ class HelixRule:
     endocardial_angle_deg: float = parameter(60.0, "deg", "theta_end, fibre angle at the endocardium")
     epicardial_angle_deg: float = parameter(-60.0, "deg", "theta_epi, fibre angle at the epicardium")
     apex_z_mm: float = parameter(-70.0, "mm", "Z of the left ventricle's apex, where the angle is zero", below=0.0)
+
+    def warnings(self, mesh: Mesh) -> Iterator[str]:
+        """See Placed."""
+        yield from apex_warnings(mesh, self.apex_z_mm)
 
     def angle(self, inward: FloatArray, z: FloatArray) -> FloatArray:
         """θ in rad from the relative distance β and the height in mm."""
@@ -93,6 +100,13 @@ class FiberGenerator(Unit):
             fixed=True,
         ),
     )
+
+    @classmethod
+    def check_mesh(cls, mesh: Mesh) -> None:
+        """InvalidInput for tetrahedra without the surfaces of a wall."""
+        if mesh.dimension == 3:
+            wall = wall_of(mesh)
+            mesh.boundary_nodes(*wall.endocardium, *wall.epicardium)
 
     def prepare(self) -> None:
         """Nothing outlives the initial state."""

@@ -12,9 +12,13 @@ from ..mesh import Mesh
 from .ellipsoid import SemiAxes, crescent_volume, half_ellipsoid_volume, half_shell_volume, level, shrunk
 from .gmsh_session import gmsh_model, tetrahedralise
 from .half_ellipsoid import Solids, half_ellipsoid
+from .size import check_size
 
 #: Below this edge length the anatomy has more than eight million elements; such a number is a slip of units.
 FINEST_SIZE_MM = 0.4
+
+#: Tetrahedra that gmsh makes of a volume of the cube of their size.
+TETRAHEDRA_PER_CUBE = 6.0
 
 # How far the nodes of a surface may be from the ellipsoid it is named for, as a part of the semi-axes: the surfaces
 # meet in curves that OpenCASCADE fits to 1e-7 mm.
@@ -98,12 +102,8 @@ class Biventricle:
         InvalidInput
             For a size the anatomy cannot be meshed with, or if gmsh does not load.
         """
-        coarsest = self.lv_wall
-        if not FINEST_SIZE_MM <= size_mm <= coarsest:
-            raise InvalidInput(
-                f"mesh_size_mm is {size_mm:g}, expected {FINEST_SIZE_MM:g} to {coarsest:g} mm: "
-                "from what a computer holds to the thickness of the left ventricular wall"
-            )
+        volume = self.lv_wall_volume + self.rv_wall_volume
+        check_size(size_mm, FINEST_SIZE_MM, self.lv_wall, TETRAHEDRA_PER_CUBE * volume, 3)
         with gmsh_model(size_mm) as gmsh:
             self.solid(gmsh)
             points, cells, surfaces = tetrahedralise(gmsh)

@@ -1,22 +1,22 @@
 """Scenes that need no mesh generator: a cell, a strand, a sheet and a slab, on regular grids."""
 
-import math
 from itertools import pairwise
 
 import numpy as np
 from skfem import MeshTet, MeshTri
 
 from ..arrays import FloatArray
-from ..errors import InvalidInput
 from ..mesh import Mesh
+from .size import check_size
 
 #: Edge of strand, sheet and slab in mm.
 _LENGTH_MM = 60.0
 _SLAB_MM = 30.0
 #: Thickness of the slab in mm: that of the left ventricle's wall.
 _WALL_MM = 12.0
-#: More elements along an edge than this are a slip of units.
-_MOST = 5000
+#: More elements in all, and more along a line, are a slip of units.
+_MOST = 8_000_000
+_MOST_LINES = 5000
 
 
 def cell(size_mm: float) -> Mesh:
@@ -26,6 +26,7 @@ def cell(size_mm: float) -> Mesh:
 
 def strand(size_mm: float) -> Mesh:
     """Lines along x from 0 to 60 mm; boundaries `left` and `right`."""
+    check_size(size_mm, _LENGTH_MM / _MOST_LINES, _LENGTH_MM, _LENGTH_MM, 1)
     x = _axis(0.0, _LENGTH_MM, size_mm)
     points = np.column_stack([x, np.zeros((len(x), 2))])
     cells = np.array(list(pairwise(range(len(x)))))
@@ -34,6 +35,8 @@ def strand(size_mm: float) -> Mesh:
 
 def sheet(size_mm: float) -> Mesh:
     """Triangles over 60 × 60 mm of the x-y plane, from (0, −30) to (60, 30); boundary `left`."""
+    triangles = 2.0 * _LENGTH_MM**2
+    check_size(size_mm, (triangles / _MOST) ** (1 / 2), _LENGTH_MM, triangles, 2)
     x, y = _axis(0.0, _LENGTH_MM, size_mm), _axis(-_LENGTH_MM / 2.0, _LENGTH_MM / 2.0, size_mm)
     grid = MeshTri.init_tensor(x, y)
     points = np.column_stack([grid.p.T, np.zeros(grid.p.shape[1])])
@@ -46,7 +49,8 @@ def slab(size_mm: float) -> Mesh:
 
     Boundaries `base` (Z = 0), `endocardium` (y = −6 mm) and `epicardium` (y = 6 mm).
     """
-    half = _WALL_MM / 2.0
+    half, tetrahedra = _WALL_MM / 2.0, 6.0 * _SLAB_MM**2 * _WALL_MM
+    check_size(size_mm, (tetrahedra / _MOST) ** (1 / 3), _WALL_MM, tetrahedra, 3)
     axes = _axis(0.0, _SLAB_MM, size_mm), _axis(-half, half, size_mm), _axis(-_SLAB_MM, 0.0, size_mm)
     grid = MeshTet.init_tensor(*axes)
     mesh = Mesh(grid.p.T, _positive(grid.p.T, grid.t.T))
@@ -57,8 +61,6 @@ def slab(size_mm: float) -> Mesh:
 def _axis(begin: float, end: float, size_mm: float) -> FloatArray:
     """From `begin` to `end` in equal parts of about the size."""
     length = end - begin
-    if not (math.isfinite(size_mm) and length / _MOST <= size_mm <= length):
-        raise InvalidInput(f"mesh_size_mm is {size_mm:g}, expected {length / _MOST:g} to {length:g} mm for this scene")
     return np.linspace(begin, end, round(length / size_mm) + 1)
 
 

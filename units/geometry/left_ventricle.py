@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InvalidInput
 from ..mesh import Mesh
-from .biventricle import FINEST_SIZE_MM
+from .biventricle import FINEST_SIZE_MM, TETRAHEDRA_PER_CUBE
 from .ellipsoid import SemiAxes, half_ellipsoid_volume, half_shell_volume, level, shrunk
 from .gmsh_session import gmsh_model, tetrahedralise
 from .half_ellipsoid import half_ellipsoid
+from .size import check_size
 
 # Nodes lie on the surface of revolution up to rounding.
 _ON_SURFACE = 1e-5
@@ -37,8 +37,7 @@ class LeftVentricle:
 
         InvalidInput for a size the anatomy cannot be meshed with, or if gmsh does not load.
         """
-        if not FINEST_SIZE_MM <= size_mm <= self.wall:
-            raise InvalidInput(f"mesh_size_mm is {size_mm:g}, expected {FINEST_SIZE_MM:g} to {self.wall:g} mm")
+        check_size(size_mm, FINEST_SIZE_MM, self.wall, TETRAHEDRA_PER_CUBE * self.wall_volume, 3)
         with gmsh_model(size_mm) as gmsh:
             occ = gmsh.model.occ
             occ.cut(half_ellipsoid(occ, self.outer), half_ellipsoid(occ, shrunk(self.outer, self.wall)))

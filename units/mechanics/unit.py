@@ -18,11 +18,12 @@ import numpy as np
 from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
+from ..mesh import Mesh
+from ..mesh.cavity import Cavity
 from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Location, Record, Variable
-from .cavity import Cavity
 from .equilibrium import Convergence, Equilibrium, Factored
 from .holzapfel_fiber import HolzapfelFiber
 from .neo_hooke import NeoHooke
@@ -67,6 +68,14 @@ class Mechanics(Unit):
             )
         ),
     )
+
+    @classmethod
+    def check_mesh(cls, mesh: Mesh) -> None:
+        """InvalidInput for tetrahedra without a base or with cavities that have no sound volume."""
+        if mesh.dimension == 3:
+            mesh.boundary("base")
+            for surfaces in wall_of(mesh).cavities.values():
+                Cavity(mesh, surfaces)
 
     def prepare(self) -> None:
         """Set up the solid; InvalidInput if directions are no unit vectors or a boundary is missing."""

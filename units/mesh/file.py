@@ -1,72 +1,148 @@
-"""Meshes on disk: any format meshio reads, boundaries as physical groups; and this project's own archives."""
+"""Meshes on disk: gmsh's own format, any other that meshio reads, and this project's own archives."""
 
-import zipfile
-from contextlib import redirect_stdout
 from pathlib import Path
 
-import meshio
 import numpy as np
 
+from ..arrays import IntArray
 from ..errors import InvalidInput
 from .archive import unpack_mesh
+from .faces import faces_of, row_keys
+from .meshio_formats import read_by_meshio
+from .msh import HEAD, read_msh
+from .naming import BOUNDARIES, Naming, named_faces
 from .simplices import Mesh
+from .stored import StoredMesh, UnreadableMesh
 
 _TAG = "gmsh:physical"
 
+#: Where in a file of gmsh's own format its head is, comments before it included.
+_HEAD_WITHIN = 65536
 
-def read_mesh(path: Path) -> Mesh:
+
+def read_mesh(path: Path, naming: Naming | None = None, scale: float = 1.0) -> Mesh:
     """Read tetrahedra and their named boundary triangles; node and element order are the file's.
 
-    A NumPy archive (.npz) that `pack_mesh` wrote may hold a mesh of any dimension.
+    `naming` says which groups, or numbers in arrays of cell data, make up a boundary, where the file's own names do
+    not; coordinates times `scale` are mm. A NumPy archive (.npz) that `pack_mesh` wrote may hold a mesh of any
+    dimension.
+
+    What a file has twice is taken once, what belongs to no tetrahedron is left out, and the mesh's notes tell of it.
 
     Raises
     ------
     InvalidInput
-        If the file is missing, is not a mesh, holds no tetrahedra or no named groups, or the mesh itself is unsound
-        (see :class:`~.mesh.Mesh`). The message begins with the file's path.
+        If the file is missing, is not a mesh, holds no tetrahedra, other cells of tissue or no named groups, or the
+        mesh itself is unsound (see :class:`~.mesh.Mesh`). The message begins with the file's path.
     """
     if not path.is_file():
         raise InvalidInput(f"{path}: no such mesh file")
-    if path.suffix == ".npz":
-        try:
-            return unpack_mesh(path)
-        # What NumPy raises of an archive that is damaged, or none; and what is wrong with the mesh in it.
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-            raise InvalidInput(f"{path}: holds no mesh of this project ({error}); write it anew") from None
     try:
-        # meshio tries the formats of an ending one by one, and prints what each of them says.
-        with redirect_stdout(None):
-            stored = meshio.read(path)
-    # meshio answers a file it cannot read with ReadError, SystemExit or whatever its parsers trip over.
-    except (Exception, SystemExit) as error:
-        raise InvalidInput(f"{path}: meshio cannot read it as a mesh ({error or type(error).__name__})") from error
-    if "tetra" not in stored.cells_dict:
-        have = ", ".join(sorted(stored.cells_dict)) or "none"
-        raise InvalidInput(f"{path}: holds no linear tetrahedra (cell types: {have}); mesh the volume, first order")
-    try:
-        return Mesh(stored.points, stored.cells_dict["tetra"], _boundaries(stored))
-    except InvalidInput as error:
+        if path.suffix == ".npz":
+            return _from_archive(path, naming, scale)
+        return _cleaned(_stored(path), naming or {}, scale)
+    except (InvalidInput, UnreadableMesh) as error:
         raise InvalidInput(f"{path}: {error}") from None
 
 
-def _boundaries(stored: meshio.Mesh) -> dict[str, np.ndarray]:
-    """Faces by the name of their physical group (gmsh) or of their set of cells (Abaqus and other formats)."""
-    triangles = stored.cells_dict.get("triangle", np.empty((0, 3), dtype=np.int64))
-    tags = stored.cell_data_dict.get(_TAG, {}).get("triangle")
-    groups = {name: int(tag) for name, (tag, dimension) in stored.field_data.items() if dimension == 2}
-    named = {name: triangles[tags == tag] for name, tag in groups.items()} if tags is not None else {}
-    for name, members in stored.cell_sets_dict.items():
-        if "triangle" in members and not name.startswith("gmsh:"):
-            named.setdefault(name, triangles[members["triangle"]])
-    if not named:
+def _from_archive(path: Path, naming: Naming | None, scale: float) -> Mesh:
+    if naming:
+        raise InvalidInput("an archive has its boundaries by their own names; remove scene.boundaries")
+    try:
+        mesh = unpack_mesh(path)
+    except InvalidInput:
+        raise
+    # What NumPy raises of an archive that is damaged, or none.
+    except Exception as error:
+        raise InvalidInput(f"holds no mesh of this project ({error}); write it anew") from None
+    return mesh if scale == 1.0 else Mesh(scale * mesh.points, mesh.cells, mesh.boundaries, mesh.notes)
+
+
+def _stored(path: Path) -> StoredMesh:
+    try:
+        with path.open("rb") as file:
+            if HEAD not in file.read(_HEAD_WITHIN):
+                return read_by_meshio(path)
+            file.seek(0)
+            return read_msh(file.read())
+    except OSError as error:
+        raise UnreadableMesh(f"cannot be read ({error.strerror})") from None
+
+
+def _cleaned(stored: StoredMesh, naming: Naming, scale: float) -> Mesh:
+    """The mesh of what is stored: everything once, and nothing but tetrahedra and faces of their surface."""
+    if stored.others:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(stored.others.items()))
         raise InvalidInput(
-            "has no named boundaries; save the surface triangles in physical groups (gmsh's formats do that)"
+            f"holds cells other than linear tetrahedra and triangles ({kinds}), and tissue must not be left out; "
+            "mesh the whole volume by tetrahedra, first order (in gmsh: Mesh.ElementOrder=1, no recombination)"
         )
-    return named
+    if not len(stored.tetrahedra):
+        raise InvalidInput(
+            f"holds no linear tetrahedra (but {len(stored.triangles)} triangles); mesh the volume, first order"
+        )
+    tetrahedra, points = stored.tetrahedra, stored.points
+    if tetrahedra.min() < 0 or tetrahedra.max() >= len(points):
+        raise InvalidInput("has tetrahedra with nodes that it does not have; save the mesh whole")
+    notes = list(stored.notes)
+    keys = row_keys(tetrahedra, len(points))
+    _, first = np.unique(keys, return_index=True)
+    if len(first) < len(tetrahedra):
+        notes.append(
+            f"{len(tetrahedra) - len(first)} of {len(tetrahedra)} tetrahedra are listed twice, as overlapping volume "
+            "groups are; each was taken once"
+        )
+        tetrahedra = tetrahedra[np.sort(first)]
+    used = np.unique(tetrahedra)
+    if len(used) < len(points):
+        notes.append(f"{len(points) - len(used)} of {len(points)} nodes belong to no tetrahedron and were left out")
+    number = np.full(len(points) + 1, -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    cells, points = number[tetrahedra], scale * points[used]
+    triangles = stored.triangles
+    missing = (triangles < 0) | (triangles >= len(stored.points))
+    triangles = number[np.where(missing, len(stored.points), triangles)]
+    boundaries = {}
+    for name, members in named_faces(stored, naming).items():
+        faces, found = _once(triangles[members], len(used))
+        if found:
+            notes.append(f"{found} faces of the boundary '{name}' are listed twice; each was taken once")
+        boundaries[name] = faces
+    dropped = _strangers_inside(boundaries, cells, len(used))
+    for name in dropped:
+        what = f"{dropped[name]} faces that are not on the surface" if dropped[name] else "no triangles"
+        notes.append(f"the group '{name}' has {what}; no unit knows it, and it was left out")
+        del boundaries[name]
+    return Mesh(points, cells, boundaries, tuple(notes))
+
+
+def _once(faces: IntArray, nodes: int) -> tuple[IntArray, int]:
+    """Each of `faces` once, in their order, and how many there were too many."""
+    keys = row_keys(faces + 1, nodes + 1)
+    _, first = np.unique(keys, return_index=True)
+    return faces[np.sort(first)], len(faces) - len(first)
+
+
+def _strangers_inside(boundaries: dict[str, IntArray], cells: IntArray, nodes: int) -> dict[str, int]:
+    """How many faces are not on the surface, of each group that no unit knows and that has such, or no faces at all."""
+    strangers = [name for name in boundaries if name not in BOUNDARIES]
+    if not strangers:
+        return {}
+    surface = faces_of(cells, nodes).surface
+    inside = {}
+    for name in strangers:
+        keys = row_keys(np.concatenate([surface, boundaries[name]]) + 1, nodes + 1)
+        count = int(np.count_nonzero(~np.isin(keys[len(surface) :], keys[: len(surface)])))
+        if count or not len(boundaries[name]):
+            inside[name] = count
+    return inside
 
 
 def write_mesh(mesh: Mesh, path: Path) -> None:
     """Write `mesh` with its boundaries as physical groups, in gmsh's format 2.2 (ASCII, 17 digits)."""
+    # Imported here: only who writes a mesh waits for it.
+    import meshio
+
     tags = {name: number for number, name in enumerate(mesh.boundaries, start=1)}
     volume_tag = len(tags) + 1
     faces = np.concatenate(list(mesh.boundaries.values()))

@@ -8,20 +8,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import FloatArray, IntArray
 from ..errors import InvalidInput
+from .faces import Faces, faces_of, row_keys
 
-#: The faces of a simplex by its dimension; of a tetrahedron each is ordered so that its normal points out of an element
-#: of positive volume.
-_FACES = {
-    0: (),
-    1: ((1,), (0,)),
-    2: ((1, 2), (2, 0), (0, 1)),
-    3: ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
-}
 _KINDS = {0: "points", 1: "lines", 2: "triangles", 3: "tetrahedra"}
 
 
@@ -41,25 +32,29 @@ class Mesh:
     boundaries:
         For each boundary name the node numbers of its faces, shape (faces, dimension). The order within a face is
         free: faces of tetrahedra are turned so that their normal points out of the tissue.
+    notes:
+        What was changed or left out to make this mesh of a file, in sentences for a person.
 
     Raises
     ------
     InvalidInput
-        For coordinates that are not finite, node numbers out of range, inverted or flat elements, nodes without an
-        element, elements that hang together in several pieces, and boundary faces that are not on the surface.
+        For coordinates that are not finite, node numbers out of range, inverted or flat elements, elements listed
+        twice or overlapping, nodes without an element, elements that do not hang together by their faces, and
+        boundary faces that are not on the surface or listed twice.
     """
 
     points: FloatArray
     cells: IntArray
     boundaries: Mapping[str, IntArray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64)
         cells = np.array(self.cells, dtype=np.int64)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
-        self._check_cells()
-        boundaries = {name: self._outward(name, faces) for name, faces in self.boundaries.items()}
+        faces = self._checked_faces()
+        boundaries = self._outward(faces.surface) if self.boundaries else {}
         object.__setattr__(self, "boundaries", boundaries)
         for array in (points, cells, *boundaries.values()):
             array.setflags(write=False)
@@ -101,11 +96,7 @@ class Mesh:
     @cached_property
     def surface(self) -> IntArray:
         """All faces that belong to one element only, those of tetrahedra with normals outward, (faces, dimension)."""
-        if self.dimension == 0:
-            return np.empty((0, 0), dtype=np.int64)
-        faces = self.cells[:, _FACES[self.dimension]].reshape(-1, self.dimension)
-        _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-        return np.asarray(faces[first[count == 1]])
+        return faces_of(self.cells, self.nodes).surface
 
     def boundary(self, name: str) -> IntArray:
         """Faces of the boundary `name`, shape (faces, 3), normals outward; InvalidInput if the mesh has none."""
@@ -121,7 +112,7 @@ class Mesh:
         """Sorted numbers of the nodes on any of the boundaries `names`."""
         return np.unique(np.concatenate([self.boundary(name).ravel() for name in names]))
 
-    def _check_cells(self) -> None:
+    def _checked_faces(self) -> Faces:
         points, cells = self.points, self.cells
         if points.ndim != 2 or points.shape[1] != 3 or not len(points):
             raise InvalidInput(f"mesh points have the shape {points.shape}, expected (nodes, 3)")
@@ -157,29 +148,70 @@ class Mesh:
             )
         if self.dimension == 0:
             # Points are cells that do not know of each other.
-            return
-        first = np.repeat(cells[:, 0], self.dimension)
-        graph = coo_matrix((np.ones(len(first)), (first, cells[:, 1:].ravel())), shape=(len(points),) * 2)
-        pieces, piece = connected_components(graph, directed=False)
-        if pieces > 1:
-            smallest = np.bincount(piece).argmin()
-            where = _first(piece == smallest)
-            raise InvalidInput(
-                f"the mesh falls into {pieces} pieces that share no node; the smallest holds node {where} at "
-                f"{np.round(points[where], 2).tolist()} mm. Remove it or fuse the volumes before meshing"
+            return faces_of(cells, len(points))
+        twice = len(cells) - len(np.unique(row_keys(cells, len(points))))
+        if twice:
+            raise InvalidInput(f"{twice} of {len(cells)} elements are listed twice; list each once")
+        faces = faces_of(cells, len(points))
+        if faces.crowded or faces.folded:
+            what = (
+                f"{faces.crowded} faces are shared by three elements or more"
+                if faces.crowded
+                else f"at {faces.folded} faces both elements lie on the same side"
             )
-
-    def _outward(self, name: str, faces: IntArray) -> IntArray:
-        faces = np.array(faces, dtype=np.int64).reshape(-1, max(self.dimension, 1))
-        if not len(faces):
-            raise InvalidInput(f"the boundary '{name}' has no face")
-        oriented = {tuple(sorted(face)): face for face in self.surface.tolist()}
-        try:
-            return np.array([oriented[tuple(sorted(face))] for face in faces.tolist()], dtype=np.int64)
-        except KeyError as missing:
             raise InvalidInput(
-                f"the boundary '{name}' has a face {missing.args[0]} that is not on the surface of the mesh"
-            ) from None
+                f"elements overlap: {what}; mesh volumes that overlap as one (in gmsh: fuse or fragment them first)"
+            )
+        self._check_parts(faces.parts)
+        return faces
+
+    def _check_parts(self, part: IntArray) -> None:
+        """All elements hang together by faces; what shares single nodes or edges only is held by nothing."""
+        sizes = np.bincount(part)
+        if len(sizes) == 1:
+            return
+        element = _first(part == sizes.argmin())
+        where = f"near {np.round(self.centroids[element], 2).tolist()} mm"
+        nodes = np.unique(self.cells[part == part[element]])
+        shared = np.intersect1d(nodes, self.cells[part != part[element]])
+        if len(shared):
+            raise InvalidInput(
+                f"the mesh falls into {len(sizes)} parts that hang together by nodes only; the smallest, of "
+                f"{sizes.min()} elements {where}, shares {len(shared)} nodes with the others, but no face. "
+                "Remove it or fuse the volumes before meshing"
+            )
+        raise InvalidInput(
+            f"the mesh falls into {len(sizes)} pieces that share no node; the smallest has {sizes.min()} elements "
+            f"{where}. Remove it or fuse the volumes before meshing"
+        )
+
+    def _outward(self, surface: IntArray) -> dict[str, IntArray]:
+        """The boundaries' faces as the surface has them, in their own order."""
+        shape = (-1, max(self.dimension, 1))
+        given = {name: np.array(faces, dtype=np.int64).reshape(shape) for name, faces in self.boundaries.items()}
+        every = np.concatenate([surface.reshape(shape), *given.values()])
+        outside = np.asarray(((every < 0) | (every >= self.nodes)).any(axis=1))
+        keys = row_keys(np.where(outside[:, None], 0, every), self.nodes)
+        known, end, outward = keys[: len(surface)], len(surface), {}
+        for name, faces in given.items():
+            if not len(faces):
+                raise InvalidInput(f"the boundary '{name}' has no face")
+            begin, end = end, end + len(faces)
+            place = np.searchsorted(known, keys[begin:end]).clip(max=len(known) - 1)
+            found = (
+                ~outside[begin:end] & (known[place] == keys[begin:end]) if len(known) else np.zeros(len(faces), bool)
+            )
+            if not found.all():
+                raise InvalidInput(
+                    f"{np.count_nonzero(~found)} of {len(faces)} faces of the boundary '{name}' are not on the surface "
+                    f"of the mesh, the first is {faces[_first(~found)].tolist()}; take those that lie between "
+                    "elements, or on nothing, out of the group (if a cavity is meshed too, save the wall's volume only)"
+                )
+            twice = len(place) - len(np.unique(place))
+            if twice:
+                raise InvalidInput(f"{twice} faces of the boundary '{name}' are listed twice; list each once")
+            outward[name] = surface[place]
+        return outward
 
 
 def _first(mask: Any) -> int:

@@ -1,13 +1,20 @@
 """Which surfaces bound the wall of the heart in a mesh, told by the names of its boundaries.
 
-A mesh is a piece of wall if it has an `endocardium`, both ventricles if it has `rv_endocardium` or `rv_septum`, and
-else a left ventricle. A boundary that its anatomy has and the mesh lacks is missed by name when it is used.
+A mesh is both ventricles if it has `rv_endocardium` or `rv_septum`, a left ventricle if it has `lv_endocardium`, and a
+piece of wall if it has an `endocardium` only; without any of them it is a left ventricle whose boundary is missed. A
+boundary that its anatomy has and the mesh lacks is missed by name when it is used.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
+import numpy as np
+
+from ..arrays import IntArray
 from ..errors import InvalidInput
+from .cavity import checked_rim, rim_of
+from .faces import row_keys
 from .simplices import Mesh
 
 
@@ -22,6 +29,11 @@ class Wall:
     epicardium: tuple[str, ...]
     cavities: Mapping[str, tuple[str, ...]]
 
+    @property
+    def boundaries(self) -> tuple[str, ...]:
+        """All of its surfaces."""
+        return ("base", *self.endocardium, *self.epicardium)
+
 
 _PIECE = Wall(("endocardium",), ("epicardium",), {})
 _LEFT_VENTRICLE = Wall(("lv_endocardium",), ("epicardium",), {"lv_volume": ("lv_endocardium",)})
@@ -30,6 +42,7 @@ _BOTH_VENTRICLES = Wall(
     ("epicardium", "rv_septum"),
     {"lv_volume": ("lv_endocardium",), "rv_volume": ("rv_endocardium", "rv_septum")},
 )
+_RIGHT = {"rv_endocardium", "rv_septum"}
 
 
 def wall_of(mesh: Mesh) -> Wall:
@@ -38,21 +51,98 @@ def wall_of(mesh: Mesh) -> Wall:
     Raises
     ------
     InvalidInput
-        Where a left ventricle has other faces than its own, which may be those of a right one.
+        Where its boundaries are no partition of the surface: a face in two of them, or, unless it is a piece of wall,
+        in none; where an `endocardium` hides a cavity, or a cavity is none.
     """
-    if "endocardium" in mesh.boundaries:
-        wall = _PIECE
-    elif {"rv_endocardium", "rv_septum"} & set(mesh.boundaries):
+    have = set(mesh.boundaries)
+    if _RIGHT & have:
         wall = _BOTH_VENTRICLES
+    elif "endocardium" in have and "lv_endocardium" not in have:
+        wall = _PIECE
     else:
         wall = _LEFT_VENTRICLE
-    if wall is _LEFT_VENTRICLE and {*wall.endocardium, *wall.epicardium} <= set(mesh.boundaries):
-        own = ("base", *wall.endocardium, *wall.epicardium)
-        others = len(mesh.surface) - sum(len(mesh.boundaries[name]) for name in own if name in mesh.boundaries)
-        if others:
-            raise InvalidInput(
-                f"the mesh has no boundary named 'rv_endocardium' or 'rv_septum', and {others} faces of its surface "
-                f"are none of {', '.join(own)}; name those of the right ventricle so, or, where there is none, give "
-                "all faces to these three"
-            )
+    names = tuple(name for name in wall.boundaries if name in have)
+    faces = _numbered(mesh)
+    _check_disjoint(faces, names)
+    if wall is _PIECE:
+        _check_open(mesh)
+        return wall
+    if "endocardium" in have:
+        _check_union(faces, wall)
+    if {*wall.endocardium, *wall.epicardium} <= have:
+        _check_complete(mesh, faces, wall, names)
+        for surfaces in wall.cavities.values():
+            checked_rim(mesh, surfaces)
     return wall
+
+
+def repeated_boundary(mesh: Mesh) -> str | None:
+    """The name of a boundary that repeats faces of a cavity's and is not used for that: a union beside its parts."""
+    closed = {"lv_endocardium", *_RIGHT} & set(mesh.boundaries)
+    return "endocardium" if closed and "endocardium" in mesh.boundaries else None
+
+
+def _numbered(mesh: Mesh) -> dict[str, IntArray]:
+    """A number for each face of each boundary, equal for equal faces; and of the whole surface, by an empty name."""
+    parts = {"": mesh.surface, **mesh.boundaries}
+    keys = row_keys(np.concatenate(list(parts.values())), mesh.nodes)
+    return dict(zip(parts, np.split(keys, np.cumsum([len(part) for part in parts.values()])[:-1]), strict=True))
+
+
+def _check_disjoint(faces: Mapping[str, IntArray], names: tuple[str, ...]) -> None:
+    for one, other in combinations(names, 2):
+        common = len(np.intersect1d(faces[one], faces[other]))
+        if common:
+            raise InvalidInput(
+                f"{common} faces are in two boundaries, '{one}' ({len(faces[one])} faces) and '{other}' "
+                f"({len(faces[other])} faces); leave each in one of them"
+            )
+
+
+def _check_open(mesh: Mesh) -> None:
+    """The inner side of a piece of wall ends at its cut sides; one that ends at the base only is a cavity's wall."""
+    inner = mesh.boundary("endocardium")
+    rim = rim_of(inner)
+    if "base" in mesh.boundaries and not len(np.setdiff1d(rim, mesh.boundary_nodes("base"))):
+        raise InvalidInput(
+            f"the boundary 'endocardium' ({len(inner)} faces) encloses a cavity, open at most at 'base' "
+            f"({len(mesh.boundary('base'))} faces), whose volume would be taken for 0; name it 'lv_endocardium', or, "
+            "of two ventricles, its parts 'lv_endocardium', 'rv_endocardium' and 'rv_septum' "
+            "(scene: {boundaries: {lv_endocardium: endocardium}})"
+        )
+
+
+def _check_union(faces: Mapping[str, IntArray], wall: Wall) -> None:
+    """An `endocardium` beside the cavities' own surfaces may repeat their faces, and is not used then."""
+    own = [name for name in (*wall.endocardium, "rv_septum") if name in faces]
+    others = np.setdiff1d(faces["endocardium"], np.concatenate([faces[name] for name in own]))
+    if len(others):
+        counted = " or ".join(f"'{name}' ({len(faces[name])} faces)" for name in own)
+        raise InvalidInput(
+            f"{len(others)} of {len(faces['endocardium'])} faces of the boundary 'endocardium' are not in {counted}, "
+            "and a cavity behind them would have no volume; name them 'lv_endocardium', 'rv_endocardium' or 'rv_septum'"
+        )
+
+
+def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names: tuple[str, ...]) -> None:
+    """Every face of the surface is in one of the anatomy's boundaries."""
+    left = np.setdiff1d(faces[""], np.concatenate([faces[name] for name in names]))
+    if not len(left):
+        return
+    held = {name: len(np.intersect1d(left, faces[name])) for name in mesh.boundaries if name not in names}
+    groups = [f"{count} in '{name}'" for name, count in held.items() if count]
+    where = f" ({', '.join(groups)})" if groups else ""
+    missing = [name for name in wall.boundaries if name not in names]
+    if wall is _LEFT_VENTRICLE:
+        missing += sorted(_RIGHT)
+    lacks = f"; the mesh has no boundary named {' or '.join(map(repr, missing))}" if missing else ""
+    most = max(held, key=lambda name: held[name], default="")
+    remedy = (
+        f"scene: {{boundaries: {{epicardium: [epicardium, {most}]}}}} joins two groups"
+        if where
+        else "name that part of the surface by a physical group"
+    )
+    raise InvalidInput(
+        f"{len(left)} of {len(faces[''])} faces of the surface are none of {', '.join(names)}{where}{lacks}; give each "
+        f"to one of the boundaries: {remedy}"
+    )

@@ -228,7 +228,7 @@ def test_wrong_parameters_of_our_own(
 def test_a_field_of_the_wrong_shape_is_refused(fmus3: dict, tiny: Mesh, join: Callable[..., FmuParticipant]) -> None:
     participant = _ready(join(fmus3["active_stress"]))
     for values in (np.array(20.0), np.full(1, 20.0), np.full(tiny.nodes + 1, 20.0)):
-        with pytest.raises(ParticipantError, match=r"'potential' of unit 'guest' got shape .*expected \(10,\)"):
+        with pytest.raises(ParticipantError, match=r"'potential' of unit 'guest' got shape .*expected \(16,\)"):
             participant.set("potential", values)
 
 

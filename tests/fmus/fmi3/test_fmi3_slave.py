@@ -315,10 +315,10 @@ def test_a_failing_step_is_discarded_and_changes_nothing(tiny: Mesh, fmus3: dict
 
 
 _MISTAKES: dict[str, tuple[Callable[[Any], Any], str]] = {
-    "too few values": (lambda d: d.set("potential", [1.0]), "got 1 values for 'potential', expected 10"),
-    "too many": (lambda d: d.set("potential", [1.0] * 11), "got 11 values for 'potential', expected 10"),
-    "not finite": (lambda d: d.set("potential", [np.nan] * 10), "'potential' .* is not finite at node"),
-    "an output": (lambda d: d.set("active_stress", [1.0] * 10), "'active_stress' is an output"),
+    "too few values": (lambda d: d.set("potential", [1.0]), "got 1 values for 'potential', expected 16"),
+    "too many": (lambda d: d.set("potential", [1.0] * 17), "got 17 values for 'potential', expected 16"),
+    "not finite": (lambda d: d.set("potential", [np.nan] * 16), "'potential' .* is not finite at node"),
+    "an output": (lambda d: d.set("active_stress", [1.0] * 16), "'active_stress' is an output"),
     "the time": (lambda d: d.set("time", [1.0]), "'time', is a Float64 that can be read only"),
     "no such reference": (lambda d: d.fmu.setFloat64([99], [1.0]), "has no value reference 99"),
     "reading none": (lambda d: d.fmu.getFloat64([99]), "has no value reference 99"),

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import InputError
+from .errors import InputError
 
 
 def make_folder(folder: Path, option: str) -> None:
@@ -40,5 +40,5 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(
-            f"{path} cannot be written ({error.strerror}); remove what is there or choose another --output"
+            f"{path} cannot be written ({error.strerror}); remove what is there, make room, or choose another --output"
         ) from None
