@@ -1,4 +1,4 @@
-"""The ways a run ends early, and what their messages are made of."""
+"""The ways a run ends early, and the hint that goes with a misspelt name."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .coupling.schemes import Sweeps
+
+from .quoting import shortened
 
 
 class InputError(Exception):
@@ -63,16 +65,6 @@ class NotConverged(Exception):
     def __init__(self, message: str, sweeps: "Sweeps") -> None:
         super().__init__(message)
         self.sweeps = sweeps
-
-
-#: Characters of a value that a message repeats.
-_SHORT = 80
-
-
-def shortened(text: str, longest: int = _SHORT) -> str:
-    """`text` as messages repeat it: on one line, without control characters, and cut where it becomes too long."""
-    plain = "".join(letter if letter.isprintable() else " " for letter in text[: longest + 1])
-    return plain if len(text) <= longest else f"{plain[:longest]}..."
 
 
 #: Characters of a name, and known names, that a hint repeats.

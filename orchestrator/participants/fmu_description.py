@@ -20,7 +20,7 @@ from lxml import etree
 
 from ...fmus.annotations import TOOL
 from ..errors import InputError
-from ..untrusted.quoting import quoted, shortened
+from ..quoting import quoted, shortened
 from .fmu_file import FmuFile
 
 _MEMBER = "modelDescription.xml"

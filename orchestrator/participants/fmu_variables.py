@@ -27,7 +27,7 @@ from fmpy.fmi2 import fmi2ValueReference
 
 from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError, did_you_mean
-from ..untrusted.quoting import quoted, shortened
+from ..quoting import quoted, shortened
 from .fmu_description import Description, Variable
 from .participant import INDEXED, Parameters, Port, Ports, Values
 

@@ -9,7 +9,7 @@ from urllib.parse import unquote
 from ...fmus.ssp import NAMESPACES
 from ..coupling.connections import Law
 from ..errors import InputError
-from ..untrusted.quoting import shortened
+from ..quoting import shortened
 from .file import check, inside, member, named, parsed, read
 from .tree import Binding
 from .unit_conversion import Measure

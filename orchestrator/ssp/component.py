@@ -10,7 +10,7 @@ from ..participants.fmu_description import Description, read_description
 from ..participants.fmu_file import FmuFile
 from ..participants.fmu_variables import fields
 from ..participants.participant import Port
-from ..untrusted.quoting import shortened
+from ..quoting import shortened
 from .file import inside, named
 from .unit_conversion import Measure
 

@@ -14,9 +14,9 @@ from lxml import etree
 
 from ...fmus.ssp import NAMESPACES, STRUCTURE
 from ..errors import InputError
+from ..quoting import quoted, shortened
 from ..untrusted.archive import LARGEST_MEMBER, open_archive
 from ..untrusted.document import parse_document
-from ..untrusted.quoting import quoted, shortened
 
 #: Those of parameter mappings are read only.
 _NAMESPACES = NAMESPACES | {"ssm": "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"}

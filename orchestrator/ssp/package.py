@@ -11,8 +11,8 @@ from typing import Any
 from ...fmus.ssp import ANNOTATION
 from ..coupling.connections import Connection
 from ..errors import InputError
+from ..quoting import quoted, shortened
 from ..scenario import Scenario, checked
-from ..untrusted.quoting import quoted, shortened
 from .component import SystemComponent
 from .connections import connections
 from .file import inside, named, unpack

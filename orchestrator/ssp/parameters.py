@@ -11,7 +11,7 @@ from typing import Any
 
 from ..coupling.connections import Law
 from ..errors import InputError, did_you_mean
-from ..untrusted.quoting import shortened
+from ..quoting import shortened
 from .binding import Entry, entries
 from .component import SystemComponent
 from .tree import Binding, SystemNode

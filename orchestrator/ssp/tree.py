@@ -13,7 +13,7 @@ from urllib.parse import unquote
 
 from ...fmus.ssp import NAMESPACES
 from ..errors import InputError
-from ..untrusted.quoting import shortened
+from ..quoting import shortened
 from .component import SystemComponent
 from .file import inside, named, read, unpack
 from .unit_conversion import Measure

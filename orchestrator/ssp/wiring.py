@@ -11,7 +11,7 @@ from typing import Any
 from ...fmus.ssp import NAMESPACES
 from ..coupling.connections import Law
 from ..errors import InputError, did_you_mean
-from ..untrusted.quoting import shortened
+from ..quoting import shortened
 from .component import SystemComponent
 from .file import named, number
 from .tree import SystemNode

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Set
 from typing import Any
 
-from ..errors import shortened as shortened
-
 #: Characters of a value that a message repeats.
 _LONGEST = 80
 
@@ -28,6 +26,12 @@ def quoted(value: Any) -> str:
     if isinstance(value, (list, tuple, Set)):
         return _collection(value, "[", "]", [_item(item) for item in _first(value)])
     return shortened(repr(value))
+
+
+def shortened(text: str, longest: int = _LONGEST) -> str:
+    """`text` on one line, without control characters, and cut where it becomes too long."""
+    plain = "".join(letter if letter.isprintable() else " " for letter in text[: longest + 1])
+    return plain if len(text) <= longest else f"{plain[:longest]}..."
 
 
 def _first(items: Any) -> list[Any]:
