@@ -29,11 +29,11 @@ class Driven:
     def begin(self) -> None:
         """See Participant."""
         self._participant.begin()
+        for name, signal in self.signals.items():
+            self._participant.set(name, signal.at(0.0, 0.0))
 
     def complete(self) -> None:
         """See Participant."""
-        for name, signal in self.signals.items():
-            self._participant.set(name, signal.at(0.0, 0.0))
         self._participant.complete()
 
     def set(self, name: str, values: Values) -> None:
@@ -140,7 +140,9 @@ def _target(column: str, participants: Mapping[str, Participant], fed: set[tuple
             f"column '{column}': the input {unit}.{name} is connected, or driven by another column; remove one of the "
             "two (`connect_by_name: false` connects nothing but what is written)"
         )
-    known = [f"{unit}.{name}" for unit, participant in participants.items() for name in participant.inputs]
+    known = {f"{unit}.{name}" for unit, participant in participants.items() for name in participant.inputs}
+    if not unit or unit not in participants:
+        known |= {name for participant in participants.values() for name in participant.inputs}
     raise InputError(f"column '{column}' is no input{did_you_mean(column, known)}")
 
 

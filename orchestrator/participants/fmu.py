@@ -235,7 +235,7 @@ class FmuParticipant:
             return whole
         key = (own is self._inputs, name)
         if key not in self._elements:
-            self._elements[key] = whole.element(place[1])
+            self._elements[key] = whole.element(name, place[1])
         return self._elements[key]
 
     def _read(self, field: Field) -> Values:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from ctypes import byref
+from ctypes import CFUNCTYPE, byref, c_char_p, c_int, c_void_p, cast
 from pathlib import Path
 from typing import Any, BinaryIO
 from weakref import WeakValueDictionary
@@ -18,6 +18,7 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 
 from ...fmus.messages import INVALID_INPUT
+from .printf import argument_types, can_read_arguments, filled
 
 #: fmi2Status from which a message tells of a failure, and from which it may tell why one came about.
 _ERROR, _WARNING = 3, 1
@@ -116,12 +117,12 @@ class Fmi2Log(FmuLog):
         super().__init__()
         self._formats = formats
         self.callbacks = fmi2CallbackFunctions()
-        self.callbacks.logger = _LOGGER
+        self.callbacks.logger = cast(_FORMATTER if formats else _LOGGER, fmi2CallbackLoggerTYPE)
         self.callbacks.componentEnvironment = id(self)
         _LOGS[id(self)] = self
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        if formats:
+        if formats and not can_read_arguments():
             addLoggerProxy(byref(self.callbacks))
 
     def hear(self, status: int, category: bytes, message: bytes) -> None:
@@ -139,5 +140,14 @@ def _route(environment: int | None, instance: bytes, status: int, category: byte
         log.hear(status, category or b"", message or b"")
 
 
+def _route_format(
+    environment: int | None, instance: bytes, status: int, category: bytes, message: bytes, *arguments: float
+) -> Any:
+    _route(environment, instance, status, category, filled(message or b"", arguments))
+
+
 # One function for all FMUs: FMPy's proxy, which fills in printf arguments, keeps only the one it was given last.
 _LOGGER = fmi2CallbackLoggerTYPE(_route)
+_FORMATTER: Any = _LOGGER
+if can_read_arguments():
+    _FORMATTER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, *argument_types())(_route_format)

@@ -27,6 +27,7 @@ from fmpy.fmi2 import fmi2ValueReference
 
 from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError, did_you_mean
+from ..quoting import quoted, shortened
 from .fmu_description import Description, Variable
 from .participant import INDEXED, Parameters, Port, Ports, Values
 
@@ -90,9 +91,8 @@ class Field:
         self._numbers = None if self._texts else np.ctypeslib.as_array(self.buffer).reshape(port.shape)
         self._given = _GIVEN.get(port.type, np.dtype(np.int64))
 
-    def element(self, place: int) -> "Field":
-        """The field of one element, in FMI 2.0."""
-        name = list(self.port.elements)[place]
+    def element(self, name: str, place: int) -> "Field":
+        """The field of one element by its name, in FMI 2.0."""
         port = replace(self.port, name=name, shape=())
         return Field(port, self._type, [self.references[place]], self._fmi)
 
@@ -213,9 +213,10 @@ def ports(fields: Mapping[str, Field]) -> Ports:
 _Group = tuple[str, int, tuple[int, ...], list[Variable]]
 
 
-def _grouped(variables: Iterable[Variable]) -> Iterator[_Group]:
+def _grouped(variables: Sequence[Variable]) -> Iterator[_Group]:
     """Name, first index, shape and members of what `variables` are as scalars and arrays."""
     groups: dict[str, list[tuple[tuple[int, ...], Variable]]] = {}
+    names = {variable.name for variable in variables}
     for variable in variables:
         name = variable.name
         index: tuple[int, ...] = ()
@@ -230,7 +231,8 @@ def _grouped(variables: Iterable[Variable]) -> Iterator[_Group]:
         members.sort(key=itemgetter(0))
         shape = _filled([index for index, _ in members])
         alike = {(item.type, item.unit, item.variability, item.causality, len(item.shape)) for _, item in members}
-        if shape is None or len(alike) > 1:
+        # Beside `x[1]` an array of `x[1][1]`, … has no name of its own.
+        if shape is None or len(alike) > 1 or name in names:
             yield from ((item.name, 1, item.shape, [item]) for _, item in members)
         else:
             yield name, members[0][0][0], shape, [item for _, item in members]
@@ -276,4 +278,8 @@ def _port(
 def _value(description: Description, parameter: str, parameters: Parameters) -> float:
     """The value of a Real parameter."""
     start = next((item.start for item in description.modelVariables if item.name == parameter), None)
-    return float(parameters.get(parameter, start or 0.0))
+    value = parameters.get(parameter, start or 0.0)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"its parameter '{shortened(parameter)}' is {quoted(value)}; expected a number") from None

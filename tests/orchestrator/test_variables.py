@@ -314,3 +314,26 @@ def test_showing_a_scenario_runs_nobodys_code(simulate: Simulate, tmp_path: Path
     with pytest.raises(InputError, match="its library is damaged, or made for another machine"):
         run_scenario(scenario, tmp_path, tmp_path / "out")
     assert Path.cwd() == here
+
+
+def test_all_that_an_fmu_logs_is_in_a_file(simulate: Simulate, tmp_path: Path) -> None:
+    simulate(_ALL)
+    log = tmp_path / "out" / "fmu.log"
+    assert not log.exists()
+    texts = []
+    for workers in ("null", "processes"):
+        simulate(_ALL, None, "", f"run.workers={workers}", talks=True)
+        texts.append([line.split("\t") for line in log.read_text().splitlines()])
+    entries = texts[0]
+    assert [entry[:4] for entry in texts[0]] == [entry[:4] for entry in texts[1]]
+    # Three steps and a warning, and a second line of three of them, which is indented.
+    assert len(entries) == 7
+    assert entries[0] == ["0 s", "a", "ok", "logAll", "at 1.000 s: 100 % of it"]
+    assert entries[1] == ["", "and a second line"]
+    # A plain message that is no format: whatever becomes of it, it is told, and nobody is harmed.
+    assert entries[2][:4] == ["0 s", "a", "warning", "logAll"]
+    assert entries[2][4].startswith("50")
+    assert entries[-2][:3] == ["2 s", "a", "ok"]
+    # What is there of an earlier run does not pass for this one's.
+    simulate(_ALL)
+    assert not log.exists()
