@@ -14,8 +14,8 @@ from .participants.driven import drive
 from .participants.native import Mesh, check_mesh, check_unit, scene_mesh
 from .participants.participant import Participant
 from .participants.recipe import Recipe
+from .participants.recorded import recorded
 from .probes import Probes
-from .results.time_series import recorded
 from .scenario import Scenario, UnitEntry
 from .scene_warnings import scene_warnings
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .coupling.schemes import Sweeps
 
-from .untrusted.quoting import shortened
+from .quoting import shortened
 
 
 class InputError(Exception):

@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from .errors import InputError, did_you_mean
-from .untrusted.quoting import quoted, shortened
+from .quoting import quoted, shortened
 from .untrusted.yaml_text import LARGEST_TEXT, parse_yaml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

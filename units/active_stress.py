@@ -28,9 +28,12 @@ from .errors import StepFailure
 from .input_ramp import InputRamp
 from .snapshot import State
 from .unit import Unit
-from .variable import Causality, Location, Record, Variable, parameter
+from .variable import VOLTAGE, Causality, Location, Record, Variable, parameter
 
 _KPA_PER_MPA = 1000.0
+
+#: Two hundred times what muscle builds up.
+_LARGEST_KPA = 1e5
 
 
 @dataclass(frozen=True)
@@ -38,8 +41,10 @@ class Tension:
     """Target and delay of the active stress (Göktepe & Kuhl 2010)."""
 
     tension_per_potential_MPa_per_mV: float = parameter(0.005, "MPa/mV", "k, active stress per potential", at_least=0.0)
-    tension_rest_potential_mV: float = parameter(-80.0, "mV", "Phi_r, potential without active stress")
-    tension_threshold_potential_mV: float = parameter(0.0, "mV", "Phi_t, potential at which the delay changes")
+    tension_rest_potential_mV: float = parameter(-80.0, "mV", "Phi_r, potential without active stress", **VOLTAGE)
+    tension_threshold_potential_mV: float = parameter(
+        0.0, "mV", "Phi_t, potential at which the delay changes", **VOLTAGE
+    )
     slow_rate_per_ms: float = parameter(0.1, "1/ms", "epsilon_0, rate of the delay at rest", above=0.0)
     fast_rate_per_ms: float = parameter(1.0, "1/ms", "epsilon_1, rate of the delay when depolarised", above=0.0)
     delay_slope_per_mV: float = parameter(1.0, "1/mV", "zeta, steepness of the delay function", above=0.0)
@@ -124,7 +129,13 @@ class ActiveStress(Unit):
                 + (earlier_target - target) * exprel(-decay)
                 + (tension - earlier_target) * np.exp(-slower) * exprel(-abs(decay - earlier_decay))
             )
-        return {"tension": tension, "active_stress": _KPA_PER_MPA * tension * self._length_factor(inputs["stretch"])}
+        active_stress = _KPA_PER_MPA * tension * self._length_factor(inputs["stretch"])
+        if not np.abs(active_stress).max() <= _LARGEST_KPA:
+            node = int(np.abs(active_stress).argmax())
+            raise StepFailure(
+                f"the active stress at node {node} is {active_stress[node]:.3g} kPa, which no tissue bears"
+            )
+        return {"tension": tension, "active_stress": active_stress}
 
     def output(self, name: str, state: State) -> FloatArray:
         """Active stress in kPa, shape (nodes,)."""

@@ -10,7 +10,11 @@ stretch has no influence on it, so it has no such input. On coarse meshes its sp
 the monodomain unit's.
 """
 
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -33,6 +37,37 @@ _PULSE = 100.0
 _SAMPLES = 20001
 #: How far before its crossing the front's foot is followed, in its own steepness: there φ is a millionth.
 _FOOT = 14.0
+#: Evaluations after which the pulse is given up; that of the default parameters takes 600.
+_MOST_EVALUATIONS = 100_000
+
+
+def _followed(rates: Callable[..., FloatArray], span: tuple[float, float], start: tuple[float, ...], **how: Any) -> Any:
+    """The solution of an ordinary differential equation, shape (components, times); InvalidInput without one."""
+    evaluations = count()
+
+    def counted(time: float, state: FloatArray) -> FloatArray:
+        if next(evaluations) > _MOST_EVALUATIONS:
+            raise _PulseLost
+        return rates(time, state)
+
+    try:
+        with warnings.catch_warnings():
+            # What LSODA warns of ends in a solution that is none.
+            warnings.simplefilter("ignore")
+            solution = solve_ivp(counted, span, start, method="LSODA", rtol=1e-8, **how)
+    # SciPy refuses spans and states that are not finite.
+    except (_PulseLost, ValueError):
+        raise InvalidInput(_NO_PULSE) from None
+    if not solution.success or not np.isfinite(solution.y).all():
+        raise InvalidInput(_NO_PULSE)
+    return solution.y
+
+
+class _PulseLost(Exception):
+    """The steps have become too short to reach the end."""
+
+
+_NO_PULSE = "the action potential of a single cell cannot be computed with these parameters of the ionic model"
 
 
 @dataclass(frozen=True)
@@ -84,24 +119,20 @@ class Eikonal(Unit):
         self._level = level
         # The recovery variable grows on the front's foot already, and exponentially from there: without it the
         # pulse is some ten milliseconds longer.
-        recovered = solve_ivp(
+        recovered = _followed(
             lambda since, recovery: ionic.rates(self._foot(since), recovery)[1],
             (-_FOOT / self._steepness, 0.0),
             (0.0,),
-            method="LSODA",
-            rtol=1e-8,
             atol=1e-12,
-        ).y[0, -1]
+        )[0, -1]
         self._moments = np.linspace(0.0, _PULSE, _SAMPLES)
-        self._pulse = solve_ivp(
+        self._pulse = _followed(
             lambda _, state: np.array(ionic.rates(state[0], state[1])),
             (0.0, _PULSE),
             (level, recovered),
             t_eval=self._moments,
-            method="LSODA",
-            rtol=1e-8,
             atol=1e-10,
-        ).y[0]
+        )[0]
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """The moment is all that changes."""

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from enum import Enum
 from functools import cache
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
@@ -19,6 +20,9 @@ from .variable import Causality, Location, Scalar, Variable, parameters_of
 
 Group = TypeVar("Group")
 _MS_PER_S = 1000.0
+
+#: Orders of magnitude that a change of sign counts for, and parameters that a message names.
+_FAR, _MOST_TOLD = 5.0, 3
 
 
 class Phase(Enum):
@@ -140,8 +144,9 @@ class Unit(ABC):
         """
         self._require(Phase.INITIALIZATION)
         self._foreseen = None
-        self.prepare()
-        self._state = self._sound(self.initial(self._inputs))
+        with self._naming_parameters():
+            self.prepare()
+            self._state = self._sound(self.initial(self._inputs))
         self._begins = dict(self._inputs) if self._ramps else {}
         self.phase = Phase.STEPPING
 
@@ -160,7 +165,9 @@ class Unit(ABC):
         if not (np.isfinite(time) and np.isfinite(step) and step >= 0.0):
             raise InvalidInput(f"unit '{self.name}' cannot step from {time} s by {step} s: both finite, the step >= 0")
         begin = self._begins or self._inputs
-        self._state = self._sound(self.advance(self._state, begin, self._inputs, time * _MS_PER_S, step * _MS_PER_S))
+        with self._naming_parameters():
+            state = self.advance(self._state, begin, self._inputs, time * _MS_PER_S, step * _MS_PER_S)
+            self._state = self._sound(state)
         self._begins = dict(self._inputs) if self._ramps else {}
 
     def terminate(self) -> None:
@@ -207,7 +214,7 @@ class Unit(ABC):
         Raises
         ------
         InvalidInput, StepFailure
-            In initialization mode, as `exit_initialization_mode` would.
+            In initialization mode, as `exit_initialization_mode` would; StepFailure for an output that is not finite.
         """
         variable = self.variable(name)
         if variable.causality is Causality.PARAMETER:
@@ -216,9 +223,10 @@ class Unit(ABC):
             return self._inputs[name] if name in self._inputs else self._default(variable)
         self._require(Phase.INITIALIZATION, Phase.STEPPING, Phase.TERMINATED)
         state = self._foresee() if self.phase is Phase.INITIALIZATION else self._state
-        if isinstance(variable, Statistic):
-            return variable(self.output(variable.source.name, state))
-        return self.output(name, state)
+        source = variable.source.name if isinstance(variable, Statistic) else name
+        with self._naming_parameters():
+            value = self._sound({source: self.output(source, state)})[source]
+        return variable(value) if isinstance(variable, Statistic) else value
 
     def parameters(self, group: type[Group]) -> Group:
         """The unit's values of one parameter group, as that frozen dataclass."""
@@ -303,11 +311,51 @@ class Unit(ABC):
                     variable.name: frozen(np.broadcast_to(variable.guess, shape)) for variable, shape in shapes.items()
                 }
             try:
-                self.prepare()
-                self._foreseen = self._sound(self.initial(self._inputs))
+                with self._naming_parameters():
+                    self.prepare()
+                    self._foreseen = self._sound(self.initial(self._inputs))
             finally:
                 self._inputs = given
         return self._foreseen
+
+    @contextmanager
+    def _naming_parameters(self) -> Iterator[None]:
+        """Put the parameters that are far from their defaults behind what goes wrong in the physics.
+
+        Numbers that nothing can be computed with end in StepFailure; what overflows on the way there is not warned of,
+        for the state and the outputs are checked.
+        """
+        try:
+            with np.errstate(all="ignore"):
+                yield
+        except (InvalidInput, StepFailure) as error:
+            unusual = self._unusual_parameters()
+            if not unusual:
+                raise
+            raise type(error)(f"{error}{unusual}") from error
+        except (np.linalg.LinAlgError, ArithmeticError, MemoryError) as error:
+            unusual = self._unusual_parameters()
+            # Without a parameter to blame, a division by zero is a bug, and should look like one.
+            if not unusual and isinstance(error, ArithmeticError):
+                raise
+            reason = str(error) or type(error).__name__
+            raise StepFailure(f"nothing can be computed any more ({reason}){unusual}") from error
+
+    def _unusual_parameters(self) -> str:
+        """The given parameters farthest from their defaults, to be put behind a message."""
+        distances: dict[str, float] = {}
+        for name, value in self._parameters.items():
+            usual = self.variable(name).start
+            if isinstance(value, str) or isinstance(usual, str) or value == usual:
+                continue
+            # A zero, or another sign, is far; the scale of what is usually zero is taken to be 1.
+            ratio = value / (usual or 1.0)
+            distances[name] = abs(np.log10(ratio)) if ratio > 0.0 else _FAR
+        far = sorted((name for name in distances if distances[name] >= 1.0), key=lambda name: -distances[name])
+        if not far:
+            return ""
+        told = ", ".join(f"{name} = {self._parameters[name]:g}" for name in far[:_MOST_TOLD])
+        return f". Far from their defaults are: {told}"
 
     # --- checks -------------------------------------------------------------------------------------------------------
 

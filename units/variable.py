@@ -12,6 +12,9 @@ from .mesh import Mesh
 
 Scalar = float | int | bool | str
 
+#: Limits of a potential in mV that could be meant: a hundred times what any cell reaches.
+VOLTAGE: dict[str, float] = {"at_least": -1e4, "below": 1e4}
+
 
 class Causality(Enum):
     """How a variable crosses the boundary of a unit (FMI 2.0.4, section 2.2.7)."""

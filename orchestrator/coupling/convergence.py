@@ -59,11 +59,15 @@ class Convergence:
     """The history of the residuals of a loop's fields over the sweeps of one step.
 
     `criteria` are those given by name, `carried` the fields that a sweep starts from. Where no field of the loop has a
-    criterion, three digits are asked of those.
+    criterion, three digits are asked of those. `exact` are fields of which only equality has a meaning: their
+    residual is 1 where a value has changed, and has to vanish.
     """
 
-    def __init__(self, criteria: Mapping[str, Criterion], carried: Collection[str] = ()) -> None:
-        self._criteria = criteria
+    def __init__(
+        self, criteria: Mapping[str, Criterion], carried: Collection[str] = (), exact: Collection[str] = ()
+    ) -> None:
+        self._exact = exact
+        self._criteria = {name: criterion for name, criterion in criteria.items() if name not in exact}
         self._carried = carried
         self._magnitudes: dict[str, float] = {}
         self.history: list[dict[str, float]] = []
@@ -73,6 +77,8 @@ class Convergence:
         first = not self.history
         self.history.append({name: _norm(residual) for name, residual in residuals.items()})
         for name, value in values.items():
+            if name in self._exact:
+                continue
             # What it was before the first sweep counts as well: a field on its way to zero has a magnitude.
             before = _norm(value - residuals[name]) if first else 0.0
             self._magnitudes[name] = max(self._magnitudes.get(name, 0.0), _norm(value), before)
@@ -87,8 +93,14 @@ class Convergence:
         return [
             name
             for name, residual in last.items()
-            if (name in named and not named[name].met(residual, _norm(values[name]), first[name]))
-            or (name in self._carried and name not in named and not residual <= limit * self._magnitudes[name])
+            if (name in self._exact and residual > 0.0)
+            or (name in named and not named[name].met(residual, _norm(values[name]), first[name]))
+            or (
+                name in self._carried
+                and name not in named
+                and name not in self._exact
+                and not residual <= limit * self._magnitudes[name]
+            )
         ]
 
     def growth(self, name: str) -> str:

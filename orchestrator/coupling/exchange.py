@@ -56,6 +56,7 @@ class Exchange:
         self._values: dict[End, Values] = {}
         self._before: dict[End, Values] = {}
         self._histories: dict[End, History] = {}
+        # In order, each once.
         self._discrete: dict[End, None] = {}
         # The connected inputs of each unit as they were when it was stepped last: where their ramps begin.
         self._begins: dict[str, dict[End, Values]] = {}
@@ -70,11 +71,6 @@ class Exchange:
         return list(self._histories)
 
     @property
-    def discrete(self) -> list[End]:
-        """The connected outputs that change at events: of them only their equality has a meaning."""
-        return list(self._discrete)
-
-    @property
     def end_ms(self) -> float:
         """Where the present step ends."""
         return self._end * _MS_PER_S
@@ -83,6 +79,11 @@ class Exchange:
     def extrapolation(self) -> int:
         """Order by which inputs that are not known yet are extrapolated."""
         return self._behaviour.extrapolation
+
+    @property
+    def discrete(self) -> list[End]:
+        """The connected outputs that change at events: of them only their equality has a meaning."""
+        return list(self._discrete)
 
     # --- a step -------------------------------------------------------------------------------------------------------
 
@@ -129,7 +130,7 @@ class Exchange:
                 if port.fixed or not initially:
                     continue
                 if port.discrete:
-                    self._discrete.setdefault(end)
+                    self._discrete[end] = None
                 else:
                     self._histories[end] = History(self._depth)
                     self._remember(end)
@@ -145,11 +146,10 @@ class Exchange:
             if (port.fixed or self._is_fixed(link.source)) and not initially:
                 continue
             at_end = self._at_end(link.source)
-            if link.source in self._histories:
-                self._uses[link] = Use(at_end, ramps)
+            self._uses[link] = Use(at_end, ramps)
             with blaming(unit):
                 if ramps and not port.discrete:
-                    participant.ramp(port.name, self._ramp(link, port))
+                    participant.ramp(port.name, self._ramp(unit, link, port))
                 else:
                     participant.set(port.name, fitted(link.carried(at_end), port))
         if initially:
@@ -228,7 +228,7 @@ class Exchange:
             return self._values[source]
         return self.foretold(source)
 
-    def _ramp(self, link: Connection, port: Port) -> Ramp:
+    def _ramp(self, unit: str, link: Connection, port: Port) -> Ramp:
         """How the input `port` runs over the step, fed by `link`."""
         source, curvature = link.source, None
         end = self._at_end(source)
@@ -236,7 +236,7 @@ class Exchange:
             # A unit that ramps its inputs would ramp from the value before: there is no way but to begin where it ends.
             held = fitted(link.carried(end), port)
             return Ramp(held, held)
-        begin = self.begun(link)
+        begin = self._begins[unit].get(source, self._values[source])
         if self._behaviour.extrapolation >= 2:
             curvature = 0.0 * end if source in self._known else self._histories[source].curvature()
         ramp = link.ramped(Ramp(begin, end, curvature))

@@ -113,7 +113,10 @@ class Iterated:
         complete()
         # There are FMUs whose outputs do not follow their inputs before they leave initialization mode.
         values = {str(end): exchange.latest(end) for end in earlier}
-        residuals = {str(end): exchange.latest(end) - before for end, before in earlier.items()}
+        residuals = {
+            str(end): _residual(before, exchange.latest(end), end in exchange.discrete)
+            for end, before in earlier.items()
+        }
         agree = settled.loops[-1].judge(residuals, values)
         return Sweeps(settled.loops, settled.converged and agree)
 
@@ -138,20 +141,23 @@ class Iterated:
         before: Sweeps,
     ) -> Sweeps:
         """Repeat `sweep` until what the `links` carry has converged; the history of it is added to those `before`."""
-        interface = _sources(links)
-        convergence = Convergence(self._limits.criteria, [str(end) for end in carried])
+        interface, discrete = _sources(links), exchange.discrete
+        exact = [str(end) for end in interface if end in discrete]
+        convergence = Convergence(self._limits.criteria, [str(end) for end in carried], exact)
+        # What changes at events is taken as it comes.
+        carried = [end for end in carried if end not in discrete]
         self._acceleration.begin()
         for number in range(1, self._limits.max_iterations + 1):
             earlier = {end: exchange.latest(end) for end in interface}
             sweep(number)
             later = {end: exchange.latest(end) for end in interface}
-            residuals = {str(end): later[end] - earlier[end] for end in interface}
+            residuals = {str(end): _residual(earlier[end], later[end], end in discrete) for end in interface}
             values = {str(end): later[end] for end in interface}
             if convergence.judge(residuals, values):
                 return before.with_loop(convergence, True)
             if number == 1:
                 self._rescale({end: later[end] for end in carried})
-            if number < self._limits.max_iterations:
+            if number < self._limits.max_iterations and carried:
                 following = self._accelerated({end: (earlier[end], later[end]) for end in carried})
                 if not all(np.isfinite(value).all() for value in following.values()):
                     raise self._failure(convergence, values, residuals, before)
@@ -223,6 +229,11 @@ class Iterated:
         unit, _, output = name.partition(".")
         location = self._participants[unit].outputs[output].location
         return location if location in ("node", "element") else "index"
+
+
+def _residual(before: Values, after: Values, discrete: bool) -> Values:
+    """H(x) − x; of values that change at events, 1 where they have changed."""
+    return np.asarray(before != after, dtype=float) if discrete else after - before
 
 
 def _sources(links: Iterable[Connection]) -> list[End]:

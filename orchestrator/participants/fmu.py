@@ -18,6 +18,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ...fmus.model_description import INPUT_INTERPOLATION
+from ..activity import doing
 from ..errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
 from .fmi2_calls import Fmi2Calls
 from .fmi3_calls import Fmi3Calls
@@ -38,6 +39,8 @@ from .participant import Abilities, Parameters, Ports, Ramp, Values, Wait
 from .ramping import PendingRamps
 
 _FATAL = 4
+
+_MS_PER_S = 1000.0
 
 #: The highest time derivative of an input that there is a value for.
 _HIGHEST_ORDER = 2
@@ -361,7 +364,8 @@ class FmuParticipant:
         """All calls of the FMU go through here."""
         self._log.clear()
         try:
-            return call(calls)
+            with doing(f"unit '{self.name}' at {self._log.time * _MS_PER_S:.12g} ms"):
+                return call(calls)
         except FMICallException as error:
             if error.status == _FATAL:
                 # FMI allows no further call, not even to free it; those written in Python would crash the process.

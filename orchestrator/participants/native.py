@@ -226,7 +226,10 @@ class NativeParticipant:
         """See Participant."""
         if name not in self._known:
             return self._known.element(name, self.get)
-        values = self._unit.get(name)
+        try:
+            values = self._unit.get(name)
+        except (InvalidInput, StepFailure) as error:
+            raise ParticipantError(str(error)) from error
         return values if isinstance(values, np.ndarray) else np.asarray(values)
 
     def start(self, time: float, size: float) -> Wait:

@@ -40,7 +40,7 @@ class Workers:
                     n_workers=count,
                     threads_per_worker=1,
                     processes=where == "processes",
-                    dashboard_address=":0",
+                    dashboard_address="127.0.0.1:0",
                     silence_logs=40,
                     memory_limit=0,
                 )

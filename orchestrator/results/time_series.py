@@ -9,17 +9,11 @@ from typing import Any
 
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
-from ..errors import InputError
 from ..participants.participant import Participant, Port, Values
+from ..participants.recorded import recorded
 from ..probes import Probes
 from .names import TIME_SERIES
 from .table import Table
-
-#: Elements of an array that all get columns of their own, where nobody asks for them.
-_SMALL = 100
-
-#: Columns of a table that a person can still use.
-_MOST = 10_000
 
 Cell = float | int | str
 
@@ -102,21 +96,3 @@ class TimeSeries:
         if column in self.texts:
             return text
         return float(text) if text else nan
-
-
-def recorded(participants: Mapping[str, Participant]) -> list[tuple[str, Port]]:
-    """What the time series has of each unit; InputError if that is more than a table should hold."""
-    chosen = [(unit, port) for unit, participant in participants.items() for port in participant.observed.values()]
-    if not chosen:
-        chosen = [
-            (unit, port)
-            for unit, participant in participants.items()
-            for port in participant.outputs.values()
-            if port.record == "probes" or (port.record != "nothing" and port.size <= _SMALL)
-        ]
-        # Probed fields first, then scalars, then those that are drawn from a field.
-        chosen.sort(key=lambda item: (item[1].record != "probes", item[1].of is not None))
-    count = sum(port.size for _, port in chosen if port.record != "probes")
-    if count > _MOST:
-        raise InputError(f"output.variables: {count} columns are too many for a table (at most {_MOST}); choose fewer")
-    return chosen

@@ -4,40 +4,38 @@ from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 from ..errors import InputError
 from ..participants.fmu_description import Description, read_description
 from ..participants.fmu_file import FmuFile
 from ..participants.fmu_variables import fields
 from ..participants.participant import Port
+from ..quoting import shortened
 from .file import inside, named
 from .unit_conversion import Measure
 
 _FMU = "application/x-fmu-sharedlibrary"
-_OTHERS = {
-    "application/x-ssp-definition": "a system description of its own",
-    "application/x-ssp-package": "a package of its own",
-}
 
 
 class SystemComponent:
-    """The component `element` of the package unpacked in `folder`; `unit` is its name in the scenario.
+    """The component `element` in the folder `base` of the unpacked `package`; `unit` is its name in the scenario.
 
-    InputError if it is none that can be coupled: another kind of component, or no FMI 2.0 co-simulation FMU.
+    `place` are the names of the systems that it is in, and its own. InputError if it is none that can be coupled:
+    another kind of component, or no FMI 2.0 co-simulation FMU.
     """
 
-    def __init__(self, element: Any, unit: str, folder: Path) -> None:
-        self.element, self.unit, self.label = element, unit, element.get("name")
+    def __init__(self, element: Any, unit: str, place: tuple[str, ...], base: Path, package: Path) -> None:
+        self.element, self.unit, self.place = element, unit, place
+        self.base, self.package = base, package
+        self.label = shortened(".".join(place))
         kind = element.get("type", _FMU)
         if kind != _FMU:
-            raise InputError(
-                f"component '{self.label}' is {_OTHERS.get(kind, f'of the type {kind}')}; only FMUs can be coupled"
-            )
+            raise InputError(f"component '{self.label}' is of the type {shortened(kind)}; only FMUs can be coupled")
         if element.get("implementation", "any") == "ModelExchange":
             raise InputError(f"component '{self.label}' is to be run by model exchange; only co-simulation is possible")
-        self.source = unquote(element.get("source"))
-        path = inside(folder, self.source, f"the FMU of component '{self.label}'")
+        path = inside(base, element.get("source"), f"the FMU of component '{self.label}'", package)
+        #: The FMU, relative to the unpacked package.
+        self.source = path.relative_to(package).as_posix()
         self.description = _described(path, f"component '{self.label}': {self.source}")
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self.path = path
@@ -46,6 +44,10 @@ class SystemComponent:
     def connectors(self) -> dict[str, Any]:
         """The component's connectors by name."""
         return {item.get("name"): item for item in named(self.element, "ssd:Connectors/ssd:Connector")}
+
+    def bindings(self) -> Iterator[Any]:
+        """Its parameter bindings."""
+        return named(self.element, "ssd:ParameterBindings/ssd:ParameterBinding")
 
     @cached_property
     def scalars(self) -> dict[str, tuple[Port, int]]:

@@ -1,32 +1,38 @@
 """Scenarios from system packages (SSP 1.0): this project's own, which say how they are coupled, and those of others."""
 
 import json
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from ...fmus.ssp import ANNOTATION
+from ..coupling.connections import Connection
 from ..errors import InputError
+from ..quoting import quoted, shortened
 from ..scenario import Scenario, checked
 from .component import SystemComponent
 from .connections import connections
-from .file import named, unpack
+from .file import inside, named, unpack
 from .parameters import parameters
+from .tree import identifier, tree
+from .wiring import Wiring
 
 _MS_PER_S = 1000.0
 
 #: Steps of a run whose package and FMUs say nothing of a step.
 _STEPS = 100
 
-_UNSUPPORTED = {
-    "ssd:Elements/ssd:System": "a system inside the system",
-    "ssd:Elements/ssd:SignalDictionaryReference": "a signal dictionary",
-    "ssd:SignalDictionaries/ssd:SignalDictionary": "a signal dictionary",
-}
+#: What an annotation of this project says, and the kinds of it; units and connections are the standard's.
+_KEPT = {"coupling": dict, "run": dict, "output": dict, "every": dict, "scene": dict}
+
+#: Characters of what is wrong with it that are told.
+_LONGEST_REASON = 200
+
+#: Characters of an annotation: a hundred times what is written there.
+_LONGEST_ANNOTATION = 1_000_000
 
 
 @contextmanager
@@ -52,14 +58,11 @@ def open_package(
 
 def _content(root: Any, folder: Path, tell: Callable[[str], None]) -> dict[str, Any]:
     """What a scenario file would say."""
-    system = next(named(root, "ssd:System"))
-    for path, what in _UNSUPPORTED.items():
-        for element in named(system, path):
-            label = element.get("name") or element.get("dictionary")
-            raise InputError(f"'{label}' is {what}, which is not supported; only FMUs can be coupled")
-    parts = _parts(system, folder)
-    given = parameters(system, parts, folder, tell)
-    links = [str(connection) for connection in connections(system, parts)]
+    whole = tree(root, folder)
+    parts = list(whole.components())
+    wiring = Wiring(whole)
+    given = parameters(whole, wiring, tell)
+    links = [_written(connection) for connection in connections(wiring)]
     units: dict[str, dict[str, Any]] = {}
     for part in parts:
         values = given[part.unit].items()
@@ -70,38 +73,25 @@ def _content(root: Any, folder: Path, tell: Callable[[str], None]) -> dict[str, 
             "start": {name: value for name, value in values if name not in own},
         }
     content = {
-        "name": _identifier(root.get("name"), r"[^\w.-]"),
+        "name": identifier(root.get("name"), allowed=".-"),
         "units": units,
         "connections": links,
         # In a package what is not connected is not meant to be.
         "connect_by_name": False,
     }
-    own_content = _annotation(root)
+    own_content = _annotation(root, folder)
+    # What is no number is refused with the scenario.
     for name, every in own_content.pop("every", {}).items():
         if name in units:
             units[name]["every"] = every
     return content | _times(root, parts) | own_content
 
 
-def _parts(system: Any, folder: Path) -> list[SystemComponent]:
-    parts: list[SystemComponent] = []
-    for element in named(system, "ssd:Elements/ssd:Component"):
-        unit = _identifier(element.get("name"), r"\W")
-        for other in parts:
-            if other.unit == unit:
-                raise InputError(
-                    f"components '{other.label}' and '{element.get('name')}' have too similar names; rename one"
-                )
-        parts.append(SystemComponent(element, unit, folder))
-    if not parts:
-        raise InputError("the system has no components, so there is nothing to run")
-    return parts
-
-
-def _identifier(name: str, forbidden: str) -> str:
-    """`name` as scenarios have names: begun by a letter, and without the characters that are `forbidden`."""
-    plain = re.sub(forbidden, "_", name)
-    return plain if plain[:1].isalpha() else f"x{plain}"
+def _written(connection: Connection) -> str | dict[str, Any]:
+    """A connection as scenarios have it; as an entry, where the names in it could not be told apart in a text."""
+    text = str(connection)
+    # A text begins with the name of a unit.
+    return connection.entry() if text.startswith("{") else text
 
 
 def _times(root: Any, parts: Sequence[SystemComponent]) -> dict[str, Any]:
@@ -113,17 +103,26 @@ def _times(root: Any, parts: Sequence[SystemComponent]) -> dict[str, Any]:
     if stop is None:
         return {"run": {}}
     stop_ms = _milliseconds(float(stop))
-    if not stop_ms > 0.0:
-        raise InputError(f"the default experiment stops at {stop} s, before it has begun")
-    proposed = [
-        float(part.description.defaultExperiment.stepSize) * _MS_PER_S
-        for part in parts
-        if part.description.defaultExperiment is not None and part.description.defaultExperiment.stepSize is not None
-    ]
-    steps = ceil(stop_ms / min(proposed) - 1e-9) if proposed and min(proposed) > 0.0 else _STEPS
+    if not 0.0 < stop_ms < inf:
+        raise InputError(f"the default experiment stops at {stop} s, before it has begun or never")
+    proposed = [step for part in parts if (step := _proposed_ms(part)) is not None]
+    # What is more steps than anybody waits for is refused with the scenario, which names both.
+    steps = ceil(min(stop_ms / min(proposed), 1e18) - 1e-9) if proposed else _STEPS
     # One output, at the end: so any other step that divides the time will do.
     times = {"coupling": {"step_ms": stop_ms / steps}, "output": {"every_ms": stop_ms}}
     return {"run": {"stop_ms": stop_ms}} | times
+
+
+def _proposed_ms(part: SystemComponent) -> float | None:
+    """The step that an FMU proposes, if it does."""
+    experiment = part.description.defaultExperiment
+    if experiment is None or experiment.stepSize is None:
+        return None
+    try:
+        step = float(experiment.stepSize) * _MS_PER_S
+    except ValueError:
+        return None
+    return step if 0.0 < step < inf else None
 
 
 def _milliseconds(seconds: float) -> float:
@@ -131,18 +130,41 @@ def _milliseconds(seconds: float) -> float:
     return float(f"{seconds * _MS_PER_S:.12g}")
 
 
-def _annotation(root: Any) -> dict[str, Any]:
+def _annotation(root: Any, folder: Path) -> dict[str, Any]:
     """What this project's own packages say beyond the standard; nothing of others."""
     for annotation in named(root, "ssd:Annotations/ssc:Annotation"):
         if annotation.get("type") != ANNOTATION:
             continue
+        text = "".join(annotation.itertext())
         try:
-            kept = json.loads("".join(annotation.itertext()))
+            if len(text) > _LONGEST_ANNOTATION:
+                raise ValueError(f"it has more than {_LONGEST_ANNOTATION} characters")
+            kept = json.loads(text)
+            if not isinstance(kept, dict) or not kept:
+                raise ValueError("it is no section")
+            for key, value in kept.items():
+                if not isinstance(value, _KEPT.get(key, ())):
+                    raise ValueError(f"{quoted(key)} does not belong there, or is no section")
             stop = next(named(root, "ssd:DefaultExperiment")).get("stopTime")
             # Another tool may have changed what the standard has a place for.
             if _milliseconds(float(stop)) != _milliseconds(kept["run"]["stop_ms"] / _MS_PER_S):
                 kept["run"]["stop_ms"] = _milliseconds(float(stop))
-        except (ValueError, KeyError, TypeError, StopIteration) as error:
-            raise InputError(f"the annotation {ANNOTATION} cannot be read ({error!r}); remove it") from None
-        return dict(kept)
+        except (ArithmeticError, LookupError, RecursionError, StopIteration, TypeError, ValueError) as error:
+            reason = shortened(f"{type(error).__name__}: {error}", _LONGEST_REASON)
+            raise InputError(f"the annotation {ANNOTATION} cannot be read ({reason}); remove it") from None
+        _check_reach(kept, folder)
+        return kept
     return {}
+
+
+def _check_reach(kept: dict[str, Any], folder: Path) -> None:
+    """InputError if an annotation reaches out of the package: to files of the person's, or to other machines."""
+    mesh = kept.get("scene", {}).get("mesh")
+    if isinstance(mesh, str):
+        inside(folder, mesh, f"the mesh of the annotation {ANNOTATION}", folder)
+    workers = kept["run"].get("workers")
+    if isinstance(workers, str) and "://" in workers:
+        raise InputError(
+            f"the annotation {ANNOTATION} sends the units to {shortened(workers)}; a package is not to choose other "
+            "machines: remove it there, and use --set run.workers=..."
+        )

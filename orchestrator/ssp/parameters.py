@@ -1,123 +1,154 @@
-"""The parameter values of a system package: its bindings, applied to the components as SSP 1.0 says.
+"""The parameter values of a system package: its bindings, applied to components and connectors as SSP 1.0 says.
 
-Bindings of the system go before those of components, later ones before earlier ones. What the standard lets a tool
+Bindings of a system go before those of what is in it, later ones before earlier ones. What the standard lets a tool
 ignore, a name that no variable has, is told; what is not supported is refused by its name.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Any
-from urllib.parse import unquote
 
-from ...fmus.ssp import NAMESPACES
-from ..errors import InputError
+from ..coupling.connections import Law
+from ..errors import InputError, did_you_mean
+from ..quoting import shortened
+from .binding import Entry, entries
 from .component import SystemComponent
-from .file import check, inside, named, read
-from .unit_conversion import Measure, conversion
-
-_SET = "application/x-ssp-parameter-set"
+from .tree import Binding, SystemNode
+from .unit_conversion import Measure, chained, conversion
+from .wiring import Hop, Pin, Wiring
 
 #: What is given to each component, by its name in the scenario.
 Given = dict[str, dict[str, Any]]
 
 
+def parameters(whole: SystemNode, wiring: Wiring, tell: Callable[[str], None]) -> Given:
+    """All values for the variables of components; names that nobody has are told to `tell`."""
+    bound = _Bound(wiring, tell)
+    bound.take(whole)
+    bound.pass_on()
+    return bound.given
+
+
 @dataclass(frozen=True)
-class _Entry:
-    """A parameter as it stands in a set."""
+class _Wanted:
+    """What a value is for: a variable of a component, its type and unit of measure."""
 
+    part: SystemComponent
     name: str
-    kind: str
-    text: str
-    unit: Measure | None
+
+    @property
+    def label(self) -> str:
+        return f"{self.part.label}.{shortened(self.name)}"
 
 
-def parameters(system: Any, parts: Sequence[SystemComponent], folder: Path, tell: Callable[[str], None]) -> Given:
-    """All values for the variables of `parts`; names that nobody has are told to `tell`."""
-    given: Given = {part.unit: {} for part in parts}
-    for part in parts:
-        for entry in _entries(part.element, folder, f"component '{part.label}'"):
-            if entry.name in part.variables:
-                given[part.unit][entry.name] = _value(entry, part, entry.name)
+class _Bound:
+    """What the bindings give, inner ones first, so that outer ones replace them."""
+
+    def __init__(self, wiring: Wiring, tell: Callable[[str], None]) -> None:
+        self._wiring, self._tell = wiring, tell
+        self.given: Given = {part.unit: {} for part in wiring.components.values()}
+        self._at: dict[Pin, Entry] = {}
+
+    def take(self, node: SystemNode) -> None:
+        """Take the values of all that is in `node`, then its own."""
+        for part in node.parts.values():
+            if isinstance(part, SystemNode):
+                self.take(part)
+                continue
+            own = (Binding(item, part.base) for item in part.bindings())
+            for entry in entries(own, f"component '{part.label}'", part.package, self._tell, part.path):
+                if not self._give(part, entry.name, entry):
+                    self._tell(
+                        f"component '{part.label}' has no variable '{shortened(entry.name)}'; its parameter value is "
+                        "not used"
+                    )
+        for entry in entries(node.bindings, node.label, node.source.package, self._tell):
+            if not self._spread(node, entry.name, entry):
+                self._tell(f"no component has the variable '{shortened(entry.name)}'; its parameter value is not used")
+
+    def pass_on(self) -> None:
+        """Give what the connectors of systems have to the variables behind them."""
+        used = set()
+        for part, pin, hops in self._wiring.fed():
+            if hops[0].source.path in self._wiring.components:
+                continue
+            # Of several the outermost, which is the first on the way.
+            for number, hop in enumerate(hops):
+                if hop.source in self._at:
+                    used.add(hop.source)
+                    self.given[part.unit][pin.name] = self._passed(hop.source, hops[number:], _Wanted(part, pin.name))
+                    break
+        for pin in self._at.keys() - used:
+            self._tell(f"the connector '{pin}' gives its parameter value to nobody; it is not used")
+
+    def _spread(self, node: SystemNode, name: str, entry: Entry) -> bool:
+        """Give a value to all that has this hierarchical name in `node`; whether there is anything."""
+        found = name in self._wiring.connectors_of(node)
+        if found:
+            self._at[Pin(node.path, name)] = entry
+        for label, part in node.parts.items():
+            rest = name.removeprefix(f"{label}.")
+            if rest == name:
+                continue
+            if isinstance(part, SystemNode):
+                found = self._spread(part, rest, entry) or found
             else:
-                tell(f"component '{part.label}' has no variable '{entry.name}'; its parameter value is not used")
-    for entry in _entries(system, folder, "the system"):
-        for part in parts:
-            name = entry.name.removeprefix(f"{part.label}.")
-            if name != entry.name and name in part.variables:
-                given[part.unit][name] = _value(entry, part, name)
-                break
-        else:
-            tell(f"no component has the variable '{entry.name}'; its parameter value is not used")
-    return given
+                found = self._give(part, rest, entry) or found
+        return found
+
+    def _give(self, part: SystemComponent, name: str, entry: Entry) -> bool:
+        if name not in part.variables:
+            return False
+        law = entry.law if entry.suppressed else chained(_converted(entry, part, name), entry.law)
+        self.given[part.unit][name] = _value(replace(entry, law=law), _Wanted(part, name))
+        return True
+
+    def _passed(self, pin: Pin, hops: Sequence[Hop], wanted: _Wanted) -> Any:
+        """The value of the connector `pin` of a system, as it arrives."""
+        entry, measure = self._at[pin], self._wiring.measure(pin)
+        relative = wanted.part.is_relative(wanted.name)
+        law = entry.law
+        if not entry.suppressed and entry.unit is not None and measure is not None:
+            law = chained(conversion(entry.unit, measure, relative), law)
+        on_the_way = self._wiring.law(hops, measure or entry.unit, relative)
+        return _value(replace(entry, law=chained(law, on_the_way)), wanted)
 
 
-def _entries(owner: Any, folder: Path, what: str) -> Iterator[_Entry]:
-    for binding in named(owner, "ssd:ParameterBindings/ssd:ParameterBinding"):
-        if binding.find("ssd:ParameterMapping", NAMESPACES) is not None:
-            raise InputError(
-                f"a parameter binding of {what} has a ParameterMapping, which is not supported; rename the parameters"
-            )
-        if binding.get("type", _SET) != _SET:
-            raise InputError(
-                f"a parameter binding of {what} is of the type {binding.get('type')}, which is not supported"
-            )
-        if binding.get("sourceBase", "SSD") != "SSD":
-            raise InputError(f"a parameter binding of {what} has its source inside an FMU, which is not supported")
-        values, where = _set(binding, folder, what)
-        units = {
-            unit.get("name"): Measure.of(unit.get("name"), unit.find("ssc:BaseUnit", NAMESPACES))
-            for unit in named(values, "ssv:Units/ssc:Unit")
-        }
-        for parameter in named(values, "ssv:Parameters/ssv:Parameter"):
-            yield _entry(parameter, binding.get("prefix", ""), units, where)
+def _converted(entry: Entry, part: SystemComponent, name: str) -> Law | None:
+    target: Measure | None = part.measure(name)
+    if entry.unit is None or target is None:
+        return None
+    try:
+        return conversion(entry.unit, target, part.is_relative(name))
+    except InputError as error:
+        raise InputError(f"parameter '{shortened(entry.name)}': {error}") from None
 
 
-def _set(binding: Any, folder: Path, what: str) -> tuple[Any, str]:
-    """The parameter set of a binding, and where it stands."""
-    source, inline = binding.get("source"), binding.find("ssd:ParameterValues/ssv:ParameterSet", NAMESPACES)
-    if (source is None) == (inline is None):
-        raise InputError(f"a parameter binding of {what} needs either a source or a ParameterSet of its own")
-    if inline is not None:
-        check(inline, "ssv", f"the parameter set of {what}")
-        return inline, f"the parameter set of {what}"
-    path = inside(folder, source, f"a parameter set of {what}")
-    return read(path, "ssv", unquote(source)), unquote(source)
-
-
-def _entry(parameter: Any, prefix: str, units: dict[str, Measure], where: str) -> _Entry:
-    name = prefix + parameter.get("name")
-    value = next(child for child in parameter if child.tag != f"{{{NAMESPACES['ssc']}}}Annotations")
-    kind, unit = value.tag.partition("}")[2], value.get("unit")
-    if kind == "Binary":
-        raise InputError(f"{where}: '{name}' is of the type Binary, which FMI 2.0 does not have")
-    return _Entry(name, kind, value.get("value"), None if unit is None else units.get(unit, Measure(unit)))
-
-
-def _value(entry: _Entry, part: SystemComponent, name: str) -> Any:
-    """The value in the type and unit of the variable `name` of `part`."""
-    variable = part.variables[name]
-    if entry.kind == "Enumeration":
-        items = (
-            {}
-            if variable.declaredType is None
-            else {item.name: int(item.value) for item in variable.declaredType.items}
+def _value(entry: Entry, wanted: _Wanted) -> Any:
+    """The value in the type and unit of the variable."""
+    if entry.kind in ("Real", "Integer") and (entry.kind == "Real" or entry.law is not None):
+        number = float(entry.text)
+        if entry.law is not None:
+            number = entry.law.factor * number + entry.law.offset
+        if not isfinite(number):
+            raise InputError(f"parameter '{shortened(entry.name)}' is {number}; expected a finite number")
+        return number
+    if entry.law not in (None, Law()):
+        raise InputError(
+            f"parameter '{shortened(entry.name)}' is of the type {entry.kind}, which no linear transformation is for"
         )
+    if entry.kind == "Enumeration":
+        declared = wanted.part.variables[wanted.name].declaredType
+        items = {} if declared is None else {item.name: item.value for item in declared.items or ()}
         if entry.text not in items:
-            known = ", ".join(items) or "none, it is no enumeration"
-            raise InputError(f"'{part.label}.{name}' has no item '{entry.text}' (known: {known})")
-        return items[entry.text]
+            raise InputError(
+                f"'{wanted.label}' has no item '{shortened(entry.text)}'"
+                + (did_you_mean(entry.text, items) if items else " (known: none, it is no enumeration)")
+            )
+        return int(items[entry.text])
     if entry.kind == "Integer":
         return int(entry.text)
     if entry.kind == "Boolean":
         return entry.text in ("true", "1")
-    if entry.kind == "String":
-        return entry.text
-    number, target = float(entry.text), part.measure(name)
-    if entry.unit is None or target is None:
-        return number
-    try:
-        law = conversion(entry.unit, target, part.is_relative(name))
-    except InputError as error:
-        raise InputError(f"parameter '{entry.name}': {error}") from None
-    return number if law is None else law.factor * number + law.offset
+    return entry.text

@@ -4,6 +4,7 @@ A value v in a unit is factor · v + offset in base units.
 """
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 from ..coupling.connections import Law
@@ -26,8 +27,18 @@ class Measure:
         """From the attributes of a BaseUnit: strings by name, or None where the unit is not defined."""
         if base is None:
             return cls(name)
-        exponents = tuple(int(base.get(key, 0)) for key in _EXPONENTS)
-        return cls(name, exponents, float(base.get("factor", 1.0)), float(base.get("offset", 0.0)))
+        try:
+            exponents = tuple(int(base.get(key, 0)) for key in _EXPONENTS)
+            factor, offset = float(base.get("factor", 1.0)), float(base.get("offset", 0.0))
+        except (TypeError, ValueError):
+            return cls(name)
+        # What has no inverse measures nothing.
+        return cls(name, exponents, factor, offset) if isfinite(factor * offset) and factor != 0.0 else cls(name)
+
+    @classmethod
+    def of_element(cls, unit: Any) -> "Measure":
+        """From a Unit of SSP 1.0."""
+        return cls.of(unit.get("name"), next(unit.iterfind("{*}BaseUnit"), None))
 
 
 def conversion(source: Measure, target: Measure, relative: bool = False) -> Law | None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ..errors import InputError
-from .quoting import quoted, shortened
+from ..quoting import quoted, shortened
 
 #: Bytes of all members together.
 LARGEST_ARCHIVE = 4 * 2**30

@@ -6,7 +6,7 @@ from xml.parsers import expat
 from lxml import etree
 
 from ..errors import InputError
-from .quoting import shortened
+from ..quoting import shortened
 
 #: Bytes that the parser is given at once. In one piece it would refuse whatever is larger than 10 MB.
 _CHUNK = 2**16

@@ -11,7 +11,7 @@ from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from .quoting import shortened
+from ..quoting import shortened
 
 #: Bytes of a text. A scenario has some thousand.
 LARGEST_TEXT = 10_000_000

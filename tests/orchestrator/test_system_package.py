@@ -501,9 +501,9 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
     ("changes", "files", "words"),
     [
         (
-            [("</ssd:Elements>", f"{_NESTED}</ssd:Elements>")],
+            [("</ssd:Elements>", f"{_NESTED * 2}</ssd:Elements>")],
             {},
-            ["'inner' is a system inside the system", "not supported"],
+            ["the system has two elements 'inner'", "rename one"],
         ),
         (
             [("</ssd:Elements>", '<ssd:SignalDictionaryReference name="bus" dictionary="d"/></ssd:Elements>')],
@@ -513,13 +513,13 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('source="resources/mass.fmu" impl', 'type="application/x-ssp-package" source="resources/mass.fmu" impl')],
             {},
-            ["component 'second' is a package of its own", "only FMUs"],
+            ["the system of component 'second'", "there is no SystemStructure.ssd in it"],
         ),
         ([('implementation="CoSimulation"', 'implementation="ModelExchange"')], {}, ["'second'", "model exchange"]),
         (
             [("</ssd:Connections>", f"{_OUTSIDE}</ssd:Connections>")],
             {},
-            ["connector 'u' is one of the system itself", "connect the components directly"],
+            ["the system has no connector 'u'"],
         ),
         (
             [('endElement="second"', 'endElement="secnd"')],
@@ -539,7 +539,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('name="x_in" kind="input"', 'name="x_in" kind="output"')],
             {},
-            ["the FMU resources/mass.fmu has no output of that name"],
+            ["'second.x_in' is of the kind output", "the FMU resources/mass.fmu has no output of that name"],
         ),
         (
             [('startConnector="v_in"', 'startConnector="F"')],
@@ -564,10 +564,14 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('prefix="second."/>', 'prefix="second."><ssd:ParameterMapping source="x.ssm"/></ssd:ParameterBinding>')],
             {},
-            ["the system has a ParameterMapping", "not supported"],
+            ["parameter mapping of the system, x.ssm", "not in the package"],
         ),
         ([('prefix="second."', 'prefix="second." type="text/csv"')], {}, ["of the type text/csv"]),
-        ([('prefix="second."', 'prefix="second." sourceBase="component"')], {}, ["source inside an FMU"]),
+        (
+            [('prefix="second."', 'prefix="second." sourceBase="component"')],
+            {},
+            ["the parameter set of the system is to be in an FMU"],
+        ),
         ([(' source="resources/damping.ssv"', "")], {}, ["needs either a source or a ParameterSet"]),
         ([("resources/damping.ssv", "resources/dampng.ssv")], {}, ["resources/dampng.ssv", "not in the package"]),
         ([("resources/damping.ssv", "../damping.ssv")], {}, ["../damping.ssv, outside of the package"]),
@@ -577,7 +581,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
             {},
             ["the FMU of component 'first', resources/muss.fmu", "not in the package"],
         ),
-        ([], {"resources__damping_dot_ssv": "<ssv"}, ["resources/damping.ssv: no well-formed XML"]),
+        ([], {"resources__damping_dot_ssv": "<ssv"}, ["resources/damping.ssv: it is no well-formed XML"]),
         (
             [],
             {"resources__damping_dot_ssv": _ssv(c=1).replace("ssv:Real value", "ssv:Reel value")},
@@ -599,7 +603,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
             ["'c' of type Real cannot be 'thick'"],
         ),
         ([], {"resources__damping_dot_ssv": _ssv(F=1)}, ["'F'", "takes a start value"]),
-        ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: no well-formed XML"]),
+        ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: it is no well-formed XML"]),
         (
             [('version="1.0" name="two masses"', 'version="2.0" name="two masses"')],
             {},
@@ -784,15 +788,17 @@ def test_parameter_values_are_converted(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("pairs", "whole"),
+    ("pairs", "connections"),
     [
-        ([(1, 1), (2, 2), (3, 3)], True),
-        ([(3, 3), (1, 1), (2, 2)], True),
-        ([(1, 1), (2, 2)], False),
-        ([(1, 2), (2, 1), (3, 3)], False),
+        ([(1, 1), (2, 2), (3, 3)], ["a.y -> b.u"]),
+        ([(3, 3), (1, 1), (2, 2)], ["a.y -> b.u"]),
+        ([(1, 1), (2, 2)], ["a.y[1] -> b.u[1]", "a.y[2] -> b.u[2]"]),
+        ([(1, 2), (2, 1), (3, 3)], ["a.y[1] -> b.u[2]", "a.y[2] -> b.u[1]", "a.y[3] -> b.u[3]"]),
     ],
 )
-def test_fields_are_connected_as_a_whole(pairs: list[tuple[int, int]], whole: bool, tmp_path: Path) -> None:
+def test_fields_are_connected_as_a_whole_or_by_their_elements(
+    pairs: list[tuple[int, int]], connections: list[str], tmp_path: Path
+) -> None:
     package = _paper(
         tmp_path / "fields.ssp",
         "".join(_scalar(f"y[{k}]", k, "output") for k in (1, 2, 3)),
@@ -803,12 +809,22 @@ def test_fields_are_connected_as_a_whole(pairs: list[tuple[int, int]], whole: bo
             "".join(f'<ssd:Connector name="u[{k}]" kind="input"/>' for k in (1, 2, 3)),
         ),
     )
-    if whole:
-        with open_package(package) as (scenario, _):
-            assert scenario.connections == ["a.y -> b.u"]
-    else:
-        with pytest.raises(InputError, match=r"a\.y -> b\.u is not of the whole field"), open_package(package):
-            pass
+    with open_package(package) as (scenario, _):
+        assert scenario.connections == connections
+
+
+def test_names_with_blanks_and_arrows_are_connected_as_they_are(tmp_path: Path) -> None:
+    package = _paper(
+        tmp_path / "names.ssp",
+        _scalar("y out * 2 -&gt; z", 0, "output"),
+        _scalar("u in", 1, "input", 'start="0"'),
+        _connect("y out * 2 -&gt; z", "u in"),
+        ('<ssd:Connector name="y out * 2 -&gt; z" kind="output"/>', '<ssd:Connector name="u in" kind="input"/>'),
+    )
+    with open_package(package) as (scenario, _):
+        (connection,) = scenario.resolved()["connections"]
+    wanted = {"from": "a", "output": "y out * 2 -> z", "to": "b", "input": "u in"}
+    assert {key: value for key, value in connection.items() if value is not None} == wanted
 
 
 def test_an_annotation_that_is_not_ours_any_more_is_refused(cosim: Cosim, tmp_path: Path) -> None:

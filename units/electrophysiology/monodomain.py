@@ -52,7 +52,9 @@ class Conduction:
         0.1, "mm2/ms", "d_ani, additional diffusion along the fibre", at_least=0.0
     )
     stretch_conductance: float = parameter(10.0, "1", "G_s, conductance of the stretch-activated current", at_least=0.0)
-    stretch_reversal: float = parameter(0.6, "1", "phi_s, dimensionless reversal potential of that current")
+    stretch_reversal: float = parameter(
+        0.6, "1", "phi_s, dimensionless reversal potential of that current", at_least=-100.0, below=100.0
+    )
     mass_matrix: str = parameter(
         "consistent",
         "1",

@@ -8,7 +8,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..errors import InvalidInput
 from ..mesh import Mesh
-from ..variable import parameter
+from ..variable import VOLTAGE, parameter
 
 #: Depth in mm that stands for the seed's surface stimulus (Z > −1e-4 mm) when the depth is given as 0.
 _SURFACE = 1e-4
@@ -21,7 +21,7 @@ _MANY = 0.25
 class Stimulus:
     """Nodes with x_min < X < x_max, |Y| < half width and Z > −depth start at the stimulus potential."""
 
-    stimulus_potential_mV: float = parameter(-10.0, "mV", "potential of the stimulated nodes at the start")
+    stimulus_potential_mV: float = parameter(-10.0, "mV", "potential of the stimulated nodes at the start", **VOLTAGE)
     stimulus_x_min_mm: float = parameter(0.0, "mm", "lower X limit of the stimulus box")
     stimulus_x_max_mm: float = parameter(31.0, "mm", "upper X limit of the stimulus box")
     stimulus_half_width_mm: float = parameter(10.0, "mm", "limit of |Y| of the stimulus box", above=0.0)

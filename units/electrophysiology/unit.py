@@ -27,7 +27,7 @@ from ..input_ramp import InputRamp
 from ..mesh.refinement import refined
 from ..snapshot import State
 from ..unit import Unit
-from ..variable import Causality, Location, Record, Variable, parameter
+from ..variable import VOLTAGE, Causality, Location, Record, Variable, parameter
 from .aliev_panfilov import AlievPanfilov
 from .monodomain import Conduction, Monodomain
 from .probes import PROBED, Probes, probe_outputs
@@ -37,21 +37,31 @@ from .time_scale import TimeScale
 #: Activation time of a node that no wave has reached yet.
 NOT_ACTIVATED = -1.0
 
+#: Substeps of a communication step, and elements and levels of a refinement, that nobody would wait for.
+_MOST_SUBSTEPS, _MOST_ELEMENTS, _MOST_LEVELS = 100_000, 1_000_000, 25
+
+#: Dimensionless potential of which nothing is left but numbers; that of cells lies between 0 and 1.
+_LARGEST_PHI = 100.0
+
 
 @dataclass(frozen=True)
 class PotentialScale:
     """Φ = β_φ φ + δ_φ, and the potential that counts as activated."""
 
-    rest_potential_mV: float = parameter(-80.0, "mV", "delta_phi, potential at rest")
-    potential_range_mV: float = parameter(100.0, "mV", "beta_phi, potential range of the action potential", above=0.0)
-    activation_potential_mV: float = parameter(-20.0, "mV", "potential whose upward crossing is the activation")
+    rest_potential_mV: float = parameter(-80.0, "mV", "delta_phi, potential at rest", **VOLTAGE)
+    potential_range_mV: float = parameter(
+        100.0, "mV", "beta_phi, potential range of the action potential", above=0.0, below=VOLTAGE["below"]
+    )
+    activation_potential_mV: float = parameter(
+        -20.0, "mV", "potential whose upward crossing is the activation", **VOLTAGE
+    )
 
 
 @dataclass(frozen=True)
 class Resolution:
     """How finely the unit solves inside, in time and in space."""
 
-    longest_substep_ms: float = parameter(0.25, "ms", "longest substep inside a communication step", above=0.0)
+    longest_substep_ms: float = parameter(0.25, "ms", "longest substep inside a communication step", at_least=1e-4)
     refine: int = parameter(0, "1", "nested refinements of the mesh to solve on; each halves the elements", at_least=0)
 
 
@@ -108,7 +118,7 @@ class Electrophysiology(Unit):
                 "the explicit step of the ionic model does not resolve the upstroke"
             )
         self._probes = self.parameters(Probes).places(self.mesh)
-        self._inner = refined(self.mesh, self._resolution.refine)
+        self._inner = refined(self.mesh, self._checked_levels())
         inherited = fiber[self._inner.parents]
         self._monodomain = Monodomain(self._inner.mesh, inherited, time_scale, self.parameters(Conduction))
 
@@ -134,7 +144,13 @@ class Electrophysiology(Unit):
         """Equal substeps, in each of which the stretch is held."""
         if step == 0.0:
             return dict(state)
-        substeps = max(1, ceil(step / self._resolution.longest_substep_ms - 1e-9))
+        count = step / self._resolution.longest_substep_ms
+        if count > _MOST_SUBSTEPS:
+            raise StepFailure(
+                f"a step of {step:g} ms would take {count:.3g} substeps of longest_substep_ms = "
+                f"{self._resolution.longest_substep_ms:g}; take shorter communication steps, or longer substeps"
+            )
+        substeps = max(1, ceil(count - 1e-9))
         substep = step / substeps
         first, last = (values["stretch"][self._inner.parents] for values in (begin, inputs))
         held = np.array_equal(first, last)
@@ -151,6 +167,12 @@ class Electrophysiology(Unit):
                     f"the potential at node {phi.argmin()} fell below {self._lowest_potential:g} mV, the pole of the "
                     "ionic model's recovery rate; look for degenerate elements there or lower longest_substep_ms"
                 )
+            if not np.abs(phi).max() <= _LARGEST_PHI:
+                node = int(np.abs(phi).argmax())
+                raise StepFailure(
+                    f"the dimensionless potential at node {node} is {phi[node]:.3g}, which no cell reaches; lower "
+                    "longest_substep_ms, or check the parameters of the ionic model"
+                )
             activation_time = self._activated(activation_time, before, phi, time + number * substep, substep)
         return {"phi": phi, "recovery": recovery, "activation_time": activation_time}
 
@@ -165,6 +187,16 @@ class Electrophysiology(Unit):
         potential = self._scale.rest_potential_mV + self._scale.potential_range_mV * phi
         potential.setflags(write=False)
         return potential
+
+    def _checked_levels(self) -> int:
+        levels, dimension = self._resolution.refine, self.mesh.dimension
+        elements = self.mesh.elements * 2 ** (dimension * min(levels, _MOST_LEVELS))
+        if dimension and (levels > _MOST_LEVELS or elements > _MOST_ELEMENTS):
+            raise InvalidInput(
+                f"parameter 'refine' is {levels}, which makes {elements:.3g} elements or more of {self.mesh.elements}; "
+                f"more than {_MOST_ELEMENTS:.0e} are refused: take fewer levels"
+            )
+        return levels
 
     @property
     def _lowest_potential(self) -> float:

@@ -37,7 +37,9 @@ class Convergence:
     equilibrium_tolerance: float = parameter(
         1e-8, "1", "largest nodal residual force, over shear modulus times element size squared", above=0.0, below=1e-2
     )
-    newton_iterations: int = parameter(25, "1", "Newton iterations before the load step is halved", at_least=1)
+    newton_iterations: int = parameter(
+        25, "1", "Newton iterations before the load step is halved", at_least=1, below=1001
+    )
 
 
 @dataclass(frozen=True)
@@ -123,9 +125,11 @@ class Equilibrium:
         if not np.isfinite(energy):
             raise _NotConverged("an element is inverted where the iteration starts")
         tangent = None
-        for _ in range(self._iterations):
+        for iteration in range(self._iterations + 1):
             if np.abs(residual).max(initial=0.0) <= self._limit:
                 return Solution(frozen(displacement), factored)
+            if iteration == self._iterations:
+                break
             if tangent is None:
                 tangent = self._solid.tangent(displacement, tension)
             correction, factored = self._correction(tangent, displacement, tension, residual, factored)
@@ -184,6 +188,11 @@ class Equilibrium:
         if self._held is None or not self._held[0].is_at(factored):
             tangent = self._solid.tangent(factored.displacement, factored.tension).tocsc()
             # The tangent is symmetric: diagonal pivots and an ordering of A + Aᵀ halve time and fill.
-            factors = splu(tangent, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+            options = {"SymmetricMode": True}
+            try:
+                factors = splu(tangent, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+            # What SuperLU says of a zero pivot, and SciPy of numbers that are none.
+            except (RuntimeError, ValueError) as error:
+                raise _NotConverged(f"the tangent stiffness cannot be factorised ({error})") from None
             self._held = (factored, factors.solve)
         return self._held[1]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from cardiac_cosim.orchestrator.errors import InputError, did_you_mean
+from cardiac_cosim.orchestrator.quoting import quoted
 from cardiac_cosim.orchestrator.scenario import load_scenario
-from cardiac_cosim.orchestrator.untrusted.quoting import quoted
 from cardiac_cosim.orchestrator.untrusted.yaml_text import parse_yaml
 
 GIBIBYTE = 2**30
