@@ -1,6 +1,6 @@
 """A run on its way into its folder: all that is written of it, in the order in which a process may end anywhere."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +13,7 @@ from ..errors import InputError, Interrupted, RunError
 from ..wall_clock import WallClock
 from .appended import check
 from .checkpoint import Checkpoint, Memories
-from .coupling_log import CouplingLog
+from .coupling_log import CouplingLog, stretches
 from .fields import Fields
 from .iteration_log import IterationLog
 from .names import COUPLING, ITERATIONS, PARTS, SUMMARY, TIME_SERIES
@@ -44,8 +44,6 @@ class Recording:
     ----------
     before:
         What an earlier process left in the same folder to go on from.
-    wall:
-        Makes the clock, from what an earlier process kept of it.
 
     Attributes
     ----------
@@ -59,17 +57,21 @@ class Recording:
         origin: Origin,
         assembly: Assembly,
         before: Memories | None,
-        wall: Callable[[Mapping[str, Any] | None], WallClock],
+        wall: WallClock,
     ) -> None:
         self.summary: dict[str, Any] = {}
         self._refusal: RunError | None = None
         self._folder, self._origin, self._assembly = folder, origin, assembly
-        kept = before or {}
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
+        self._wall = wall
         self._fields: Fields | None = None
         self._iterations: IterationLog | None = None
         # The fields first: a value that is not finite ends the step before the time series has a row of it.
         recorders: dict[str, Recorder] = {}
+
+        def kept(name: str) -> Any:
+            return None if before is None else before[name]
+
         with ExitStack() as opened:
 
             def add(name: str, recorder: Any) -> Any:
@@ -77,14 +79,13 @@ class Recording:
                 return recorder
 
             if assembly.mesh is not None:
-                self._fields = add("fields", Fields(folder, participants, assembly.mesh, kept.get("fields")))
-            series = TimeSeries(folder, participants, assembly.probes, kept.get("series"))
+                self._fields = add("fields", Fields(folder, participants, assembly.mesh, kept("fields")))
+            series = TimeSeries(folder, participants, assembly.probes, kept("series"))
             self._series: TimeSeries = add("series", series)
-            self._log: CouplingLog = add("log", CouplingLog(folder, master.units, assembly.converged, kept.get("log")))
+            self._log: CouplingLog = add("log", CouplingLog(folder, master.units, assembly.converged, kept("log")))
             if assembly.converged:
-                self._iterations = add("iterations", IterationLog(folder, assembly.converged, kept.get("iterations")))
+                self._iterations = add("iterations", IterationLog(folder, assembly.converged, kept("iterations")))
             self._profile = opened.enter_context(closing(Profile(folder, list(participants))))
-            self._wall = wall(kept.get("wall"))
             opened.pop_all()
         self._recorders = recorders
         memories = {"master": master.memory, "wall": self._wall.memory}
@@ -98,6 +99,7 @@ class Recording:
         """Whether all is there that `before` goes on from; DamagedFile if not. Nothing is touched."""
         check(folder / TIME_SERIES, before["series"])
         check(folder / COUPLING, before["log"]["table"])
+        stretches(before["log"])
         if "iterations" in before:
             check(folder / ITERATIONS, before["iterations"])
         if "fields" in before:
