@@ -137,6 +137,8 @@ class Recording:
         ending = self._ending(error, problems)
         done = ending is None
         resumable = self._checkpoint.exists and not done
+        if isinstance(error, Interrupted):
+            error.resumable = resumable
         outcome = _outcome(ending) | {"unconverged_ms": self._log.unconverged, "resumable": resumable}
         scenario, seconds = self._assembly.scenario, self._wall.seconds()
         path = self._folder / SUMMARY

@@ -54,6 +54,6 @@ def _raise_if_full(path: Path, error: OSError) -> None:
     """RunError where there is no room: nothing is wrong with what the person chose."""
     if error.errno in _FULL:
         raise RunError(
-            f"the results cannot be written ({error.filename or path}: {error.strerror}); make room, or choose another "
+            f"not all can be written ({error.filename or path}: {error.strerror}); make room, or choose another "
             "--output"
         ) from None

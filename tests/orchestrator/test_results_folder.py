@@ -499,7 +499,7 @@ def test_where_no_more_can_be_written_the_run_ends_with_3_and_goes_on_when_it_ca
     )
     assert ended.returncode == 3, ended
     assert ended.stderr.count("\n") == 1
-    assert ended.stderr.startswith("failed: the results cannot be written")
+    assert ended.stderr.startswith("failed: the results cannot be written (")
     assert "File too large" in ended.stderr
     summary = json.loads((out / "summary.json").read_text())
     assert summary["status"] == "failed"
