@@ -19,7 +19,7 @@ from .stored import StoredMesh, UnreadableMesh, by_number
 _CHILD = Path(__file__).with_name("meshio_child.py")
 
 #: Seconds of a processor that any file gets, and more for each megabyte; so long in all at most, on a busy machine.
-_SECONDS, _SECONDS_PER_MB, _PATIENCE = 6.0, 2.0, 5.0
+_SECONDS, _SECONDS_PER_MB, _PATIENCE = 4.0, 2.0, 5.0
 #: Bytes of memory that any file gets, and more for each byte in it.
 _MEMORY, _MEMORY_PER_BYTE = 2 * 2**30, 50
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import IntArray
 from ..errors import InvalidInput
@@ -52,7 +53,7 @@ def wall_of(mesh: Mesh) -> Wall:
     ------
     InvalidInput
         Where its boundaries are no partition of the surface: a face in two of them, or, unless it is a piece of wall,
-        in none; where an `endocardium` hides a cavity, or a cavity is none.
+        in none; where an `endocardium` hides a cavity, a cavity is none, or the septum is not between the two.
     """
     have = set(mesh.boundaries)
     if _RIGHT & have:
@@ -73,6 +74,8 @@ def wall_of(mesh: Mesh) -> Wall:
         _check_complete(mesh, faces, wall, names)
         for surfaces in wall.cavities.values():
             checked_rim(mesh, surfaces)
+        if wall is _BOTH_VENTRICLES:
+            _check_septum(mesh)
     return wall
 
 
@@ -121,6 +124,19 @@ def _check_union(faces: Mapping[str, IntArray], wall: Wall) -> None:
         raise InvalidInput(
             f"{len(others)} of {len(faces['endocardium'])} faces of the boundary 'endocardium' are not in {counted}, "
             "and a cavity behind them would have no volume; name them 'lv_endocardium', 'rv_endocardium' or 'rv_septum'"
+        )
+
+
+def _check_septum(mesh: Mesh) -> None:
+    """The right cavity's volume does not depend on which of its sides is the septum, but the fibres do."""
+    left = cKDTree(mesh.points[mesh.boundary_nodes("lv_endocardium")])
+    septum, free = (
+        left.query(mesh.points[mesh.boundary(name)].mean(axis=1))[0].mean() for name in ("rv_septum", "rv_endocardium")
+    )
+    if septum > free:
+        raise InvalidInput(
+            f"'rv_septum' lies farther from the left cavity than 'rv_endocardium' ({septum:.3g} and {free:.3g} mm on "
+            "average); exchange their names"
         )
 
 
