@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..errors import InvalidInput
+from ..errors import InvalidInput, listed
 from .faces import Faces, faces_of, row_keys
 
 #: A coordinate that nothing can be computed with: a thousand kilometres, in mm.
@@ -103,9 +103,8 @@ class Mesh:
     def boundary(self, name: str) -> IntArray:
         """Faces of the boundary `name`, shape (faces, 3), normals outward; InvalidInput if the mesh has none."""
         if name not in self.boundaries:
-            have = ", ".join(sorted(self.boundaries)) or "none"
             raise InvalidInput(
-                f"the mesh has no boundary named '{name}' (it has: {have}); "
+                f"the mesh has no boundary named '{name}' (it has: {listed(self.boundaries)}); "
                 f"name that part of the surface by a physical group '{name}'"
             )
         return self.boundaries[name]

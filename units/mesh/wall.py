@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import IntArray
-from ..errors import InvalidInput
+from ..errors import InvalidInput, listed
 from .cavity import checked_rim, rim_of
 from .faces import row_keys
 from .simplices import Mesh
@@ -147,7 +147,7 @@ def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names
         return
     held = {name: len(np.intersect1d(left, faces[name])) for name in mesh.boundaries if name not in names}
     groups = [f"{count} in '{name}'" for name, count in held.items() if count]
-    where = f" ({', '.join(groups)})" if groups else ""
+    where = f" ({listed(groups)})" if groups else ""
     missing = [name for name in wall.boundaries if name not in names]
     if wall is _LEFT_VENTRICLE:
         missing += sorted(_RIGHT)
