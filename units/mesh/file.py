@@ -20,6 +20,9 @@ _TAG = "gmsh:physical"
 #: Where in a file of gmsh's own format its head is, comments before it included.
 _HEAD_WITHIN = 65536
 
+#: A file of more bytes holds more elements than can be computed with.
+_LARGEST_BYTES = 2 * 10**9
+
 #: What an archive may unpack to: so many bytes, and more for each of its own. Meshes compress to a third or so.
 _ARCHIVE_BYTES, _ARCHIVE_RATIO = 10**8, 20
 
@@ -67,6 +70,9 @@ def _from_archive(path: Path, naming: Naming | None, scale: float) -> Mesh:
 
 
 def _stored(path: Path) -> StoredMesh:
+    size = path.stat().st_size
+    if size > _LARGEST_BYTES:
+        raise UnreadableMesh(f"has {size / 1e9:.1f} GB, more than any mesh of a heart; choose larger elements")
     try:
         with path.open("rb") as file:
             if HEAD not in file.read(_HEAD_WITHIN):

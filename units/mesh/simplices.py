@@ -105,7 +105,8 @@ class Mesh:
         if name not in self.boundaries:
             raise InvalidInput(
                 f"the mesh has no boundary named '{name}' (it has: {listed(self.boundaries)}); "
-                f"name that part of the surface by a physical group '{name}'"
+                f"name that part of the surface by a physical group '{name}', or say which groups of the file it is by "
+                "scene.boundaries"
             )
         return self.boundaries[name]
 

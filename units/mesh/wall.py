@@ -156,7 +156,7 @@ def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names
     remedy = (
         f"scene: {{boundaries: {{epicardium: [epicardium, {most}]}}}} joins two groups"
         if where
-        else "name that part of the surface by a physical group"
+        else "name that part of the surface by a physical group, or by scene.boundaries"
     )
     raise InvalidInput(
         f"{len(left)} of {len(faces[''])} faces of the surface are none of {', '.join(names)}{where}{lacks}; give each "
