@@ -83,7 +83,11 @@ def _groups(value: Any) -> list[str | int]:
 
 def _scale(value: Any) -> Any:
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not (isinstance(value, str) and value in _LENGTHS_MM) and not (number and _SCALES[0] <= value <= _SCALES[1]):
+    if (
+        value is not None
+        and not (isinstance(value, str) and value in _LENGTHS_MM)
+        and not (number and _SCALES[0] <= value <= _SCALES[1])
+    ):
         raise ValueError(
             f"expected a unit of length, {', '.join(_LENGTHS_MM)}, or a number from {_SCALES[0]:g} to {_SCALES[1]:g} "
             "that makes mm of the file's coordinates"
