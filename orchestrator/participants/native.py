@@ -16,7 +16,7 @@ from ...units.mesh.file import read_mesh
 from ...units.mesh.frame import check_frame, frame_warnings
 from ...units.mesh.places import Places
 from ...units.mesh.quality import signed_inverse_condition_number
-from ...units.mesh.wall import repeated_boundary
+from ...units.mesh.wall import wall_warnings
 from ...units.registry import UNITS
 from ...units.snapshot import Snapshot
 from ...units.statistics import Statistic
@@ -70,9 +70,7 @@ def check_mesh(mesh: Mesh, scene: Scene, folder: Path, units: Collection[str]) -
 
 def mesh_warnings(mesh: Mesh, scene: Scene) -> list[str]:
     """What was changed to read the mesh, and what is unusual of it."""
-    repeated = repeated_boundary(mesh)
-    unused = [] if repeated is None else [f"the boundary '{repeated}' repeats faces of others and is not used"]
-    return [*mesh.notes, *unused, *frame_warnings(mesh, scene.scale is not None)]
+    return [*mesh.notes, *wall_warnings(mesh), *frame_warnings(mesh, scene.scale is not None)]
 
 
 def unit_warnings(unit: str, parameters: Parameters, mesh: Mesh) -> list[str]:
