@@ -14,9 +14,9 @@ from ..fmus.system import System
 from .assembly import checked_mesh
 from .errors import InputError
 from .participants.native import Mesh, fmu_of_unit, packed_mesh
-from .results.writing import allowed, make_folder
 from .scenario import Scenario
 from .system import MESH, beyond_the_standard, system_of
+from .writing import allowed, make_folder
 
 
 @dataclass(frozen=True)

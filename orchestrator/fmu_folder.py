@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 
 from .errors import InputError
 from .participants.native import Mesh, fmu_of_unit
-from .results.writing import make_folder
+from .writing import make_folder
 
 
 class FmuFolder:

@@ -22,11 +22,11 @@ from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..participants.native import Mesh
 from ..participants.participant import Participant, Port, Values
+from ..writing import remove_stale, writing
 from .hdf5 import write_streamed
 from .names import FIELDS, PARTS, XDMF
 from .parts import Parts
 from .whole import replacing
-from .writing import remove_stale, writing
 
 #: How XDMF calls the elements, by dimension.
 _TOPOLOGIES = {

@@ -12,6 +12,7 @@ from typing import Any
 from ..assembly import Assembly
 from ..errors import InputError
 from ..wall_clock import WallClock
+from ..writing import allowed, remove_stale, writing
 from .checkpoint import Memories, read_checkpoint
 from .hdf5 import DamagedFile
 from .lock import FolderLock
@@ -20,7 +21,6 @@ from .origin import Origin
 from .recording import Recording
 from .summary import is_summary
 from .whole import reserve, unfinished
-from .writing import allowed, remove_stale, writing
 
 #: Space in bytes that is kept for the summary: a run that ends because the disk is full is to say so.
 _RESERVE = 16384

@@ -7,7 +7,7 @@ from pathlib import Path
 from filelock import lock_descriptor
 
 from ..errors import InputError
-from .writing import allowed
+from ..writing import allowed
 
 _NAME = ".lock"
 

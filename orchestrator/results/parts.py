@@ -8,8 +8,8 @@ from pathlib import Path
 import h5py
 
 from ..participants.participant import Values
+from ..writing import writing
 from .hdf5 import DamagedFile, reading_sealed, write_sealed
-from .writing import writing
 
 
 class Parts:

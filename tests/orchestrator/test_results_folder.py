@@ -420,6 +420,19 @@ def test_a_crash_is_recorded_as_one_and_raised_all_the_same(
     assert summary["message"] == "AssertionError: nobody expected this"
 
 
+def test_whoever_ends_the_process_does_not_end_it_as_if_the_run_were_done(
+    cosim: Cosim, small_scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def leave(self: Any, step: Any, exchange: Any) -> None:
+        sys.exit(0)
+
+    monkeypatch.setattr("cardiac_cosim.orchestrator.results.profile.Profile.accept", leave)
+    ended = cosim(*_arguments(small_scenario, tmp_path / "out"))
+    assert (ended.code, ended.err.count("\n")) == (3, 1)
+    assert "ended the process (exit code 0)" in ended.err
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "failed"
+
+
 @pytest.mark.parametrize(("after", "resumable"), [(2, False), (3, True)])
 def test_only_what_has_a_checkpoint_is_resumable(
     small_scenario: Path, tmp_path: Path, after: int, resumable: bool, monkeypatch: pytest.MonkeyPatch

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import InputError, RunError
+from .errors import InputError, RunError
 
 #: No room on the device, for this user, or for so large a file.
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
