@@ -34,7 +34,7 @@ class AppendedFile:
             self._file.seek(self._size)
 
     def append(self, content: bytes) -> None:
-        """Add `content` and hand it to the operating system; if that is refused or interrupted, the file is as before."""
+        """Add `content` and hand it to the operating system; where that is refused, the file is as before."""
         rest = content
         try:
             while rest:
