@@ -345,6 +345,27 @@ def test_a_summary_that_is_none_is_no_complete_run(small_scenario: Path, tmp_pat
     assert _run(small_scenario, tmp_path / "out", "run.stop_ms=2", resume=True)["steps"] == 2
 
 
+def test_no_damage_to_a_summary_ends_in_a_traceback(cosim: Cosim, small_scenario: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    _run(small_scenario, out, "run.stop_ms=2")
+    before = _bytes(out)
+    summary = json.loads(before["summary.json"])
+    damaged: list[bytes] = []
+    # Any value of any key replaced by something of another kind.
+    for key, value in summary.items():
+        for other in (None, "text", -1, [1, "x"], {"x": "y"}, {"total": None}):
+            if type(other) is not type(value) or isinstance(value, (dict, list)):
+                damaged.append(json.dumps(summary | {key: other}).encode())
+    chance = random.Random(3)
+    for content in chance.sample(damaged, 60):
+        shutil.rmtree(out)
+        out.mkdir()
+        for name, data in (before | {"summary.json": content}).items():
+            (out / name).write_bytes(data)
+        ended = cosim(*_arguments(small_scenario, out, "--resume", "--set", "run.stop_ms=2"))
+        assert (ended.code, ended.err.count("\n")) in ((0, 0), (2, 1)), (content, ended)
+
+
 def test_what_a_process_left_that_was_killed_after_its_summary_is_removed(small_scenario: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     first = _run(small_scenario, out)
