@@ -35,6 +35,9 @@ _TRUE = ("true", "1")
 #: Value references are 32 bits wide.
 _REFERENCES = 2**32
 
+#: Dimensions of an array; NumPy's own limit is 32 in its older versions.
+MOST_DIMENSIONS = 16
+
 #: Elements of an array, 160 MB of numbers; more is a slip of the pen, or meant to fill the memory.
 _MOST_ELEMENTS = 20_000_000
 
@@ -220,7 +223,8 @@ def _check(variables: Sequence[Variable]) -> None:
         wrong = next(variable for variable in variables if not 0 <= variable.valueReference < _REFERENCES)
         raise InputError(f"its variable '{wrong.name}' has no valid value reference: {wrong.valueReference}")
     for variable in variables:
-        if variable.shape and (min(variable.shape) < 0 or prod(variable.shape) > _MOST_ELEMENTS):
+        shape = variable.shape
+        if shape and (len(shape) > MOST_DIMENSIONS or min(shape) < 0 or prod(shape) > _MOST_ELEMENTS):
             raise InputError(
                 f"its variable '{variable.name}' has the shape {variable.shape}; dimensions are counts, and more than "
                 f"{_MOST_ELEMENTS} elements are refused"
