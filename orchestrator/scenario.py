@@ -210,7 +210,7 @@ Written = Annotated[
 class Inputs(_Section):
     """Signals that drive inputs: the columns of a CSV file."""
 
-    file: Annotated[str, Field(min_length=1)]
+    file: Annotated[FilePath, Field(min_length=1)]
 
 
 class CriterionEntry(_Section):
@@ -242,7 +242,7 @@ class Adaptive(_Section):
 
     tolerance: Positive = 0.1
     min_ms: Positive = 0.5
-    max_ms: Positive = 20.0
+    max_ms: Annotated[Positive, Field(le=_MOST)] = 20.0
 
     @model_validator(mode="after")
     def _ordered(self) -> "Adaptive":

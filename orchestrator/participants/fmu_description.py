@@ -20,6 +20,7 @@ from lxml import etree
 
 from ...fmus.annotations import TOOL
 from ..errors import InputError
+from ..quoting import quoted, shortened
 from .fmu_file import FmuFile
 
 _MEMBER = "modelDescription.xml"
@@ -106,7 +107,9 @@ def read_description(file: FmuFile) -> Description:
             raise
         # FMPy raises plain Exceptions.
         except Exception as error:
-            raise InputError(f"FMPy cannot read it as an FMU ({error or type(error).__name__})") from None
+            raise InputError(
+                f"FMPy cannot read it as an FMU ({shortened(str(error) or type(error).__name__, 200)})"
+            ) from None
         _check(variables)
     own = _own(root)
     unit = None if own is None else own.find("Unit")
@@ -128,12 +131,13 @@ def _version(root: Any) -> str:
     version = root.get("fmiVersion")
     if root.tag != "fmiModelDescription" or version is None:
         raise InputError(
-            f"its {_MEMBER} describes no FMU (the root is {root.tag}, fmiVersion {version or 'not given'})"
+            f"its {_MEMBER} describes no FMU (the root is {shortened(root.tag)}, fmiVersion "
+            f"{shortened(version or 'not given')})"
         )
     if version.startswith("1."):
         raise InputError("an FMU of FMI 1.0, which is not supported; export it for co-simulation by FMI 2.0 or 3.0")
     if version != "2.0" and not version.startswith("3."):
-        raise InputError(f"an FMU of FMI {version}, which is not supported; export it by FMI 2.0 or 3.0")
+        raise InputError(f"an FMU of FMI {shortened(version)}, which is not supported; export it by FMI 2.0 or 3.0")
     if root.find("CoSimulation") is not None:
         return "2.0" if version == "2.0" else "3.0"
     for kind, words in (("ModelExchange", "model exchange"), ("ScheduledExecution", "scheduled execution")):
@@ -158,7 +162,7 @@ def _head(root: Any) -> Any:
 def _variable(element: Any, types: Mapping[str, Any]) -> Variable:
     value = next((child for child in element if child.tag in _TYPES), None)
     if value is None:
-        raise InputError(f"its variable '{element.get('name')}' has no type")
+        raise InputError(f"its variable '{shortened(str(element.get('name')))}' has no type")
     causality, variability = element.get("causality", "local"), element.get("variability", "continuous")
     initial = element.get("initial")
     if initial is None and causality != "input":
@@ -171,7 +175,10 @@ def _variable(element: Any, types: Mapping[str, Any]) -> Variable:
     else:
         kind = types.get(declared)
         if kind is None:
-            raise InputError(f"its variable '{element.get('name')}' is of the type '{declared}', which it lacks")
+            raise InputError(
+                f"its variable '{shortened(str(element.get('name')))}' is of the type '{shortened(declared)}', which "
+                "it lacks"
+            )
         unit = unit or kind.unit
         relative = value.get("relativeQuantity", "true" if kind.relativeQuantity else "false") in _TRUE
     return Variable(
@@ -214,20 +221,22 @@ def _check(variables: Sequence[Variable]) -> None:
         seen: set[str] = set()
         for variable in variables:
             if variable.name in seen:
-                raise InputError(f"two of its variables are named '{variable.name}'; export it with names of their own")
+                raise InputError(
+                    f"two of its variables are named '{shortened(variable.name)}'; export it with names of their own"
+                )
             seen.add(variable.name)
     if None in names or "" in names:
         raise InputError("one of its variables has no name")
     references = [variable.valueReference for variable in variables]
     if references and not 0 <= min(references) <= max(references) < _REFERENCES:
         wrong = next(variable for variable in variables if not 0 <= variable.valueReference < _REFERENCES)
-        raise InputError(f"its variable '{wrong.name}' has no valid value reference: {wrong.valueReference}")
+        raise InputError(f"its variable '{shortened(wrong.name)}' has no valid value reference: {wrong.valueReference}")
     for variable in variables:
         shape = variable.shape
         if shape and (len(shape) > MOST_DIMENSIONS or min(shape) < 0 or prod(shape) > _MOST_ELEMENTS):
             raise InputError(
-                f"its variable '{variable.name}' has the shape {variable.shape}; dimensions are counts, and more than "
-                f"{_MOST_ELEMENTS} elements are refused"
+                f"its variable '{shortened(variable.name)}' has the shape {quoted(variable.shape)}; dimensions are "
+                f"counts, and more than {_MOST_ELEMENTS} elements are refused"
             )
 
 

@@ -27,6 +27,7 @@ from fmpy.fmi2 import fmi2ValueReference
 
 from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError, did_you_mean
+from ..quoting import quoted, shortened
 from .fmu_description import MOST_DIMENSIONS, Description, Variable
 from .participant import INDEXED, Parameters, Port, Ports, Values
 
@@ -277,4 +278,8 @@ def _port(
 def _value(description: Description, parameter: str, parameters: Parameters) -> float:
     """The value of a Real parameter."""
     start = next((item.start for item in description.modelVariables if item.name == parameter), None)
-    return float(parameters.get(parameter, start or 0.0))
+    value = parameters.get(parameter, start or 0.0)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"its parameter '{shortened(parameter)}' is {quoted(value)}; expected a number") from None
