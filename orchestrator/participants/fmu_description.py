@@ -95,6 +95,7 @@ def read_description(file: FmuFile) -> Description:
         try:
             head = fmpy.read_model_description(_archive(_head(root) if version == "2.0" else root), validate=False)
             types = {kind.name: kind for kind in head.typeDefinitions}
+            _check_items(types)
             if version == "2.0":
                 variables = [_variable(element, types) for element in root.iterfind("ModelVariables/ScalarVariable")]
             else:
@@ -124,6 +125,18 @@ def read_description(file: FmuFile) -> Description:
         _NO_FIELDS if own is None else {field.get("name"): dict(field.attrib) for field in own.iter("Field")},
         unit is not None and unit.get("memoryless") == "true",
     )
+
+
+def _check_items(types: Mapping[str, Any]) -> None:
+    """InputError for an enumeration whose items have no numbers."""
+    for name, kind in types.items():
+        for item in kind.items:
+            try:
+                int(item.value)
+            except (TypeError, ValueError):
+                raise InputError(
+                    f"the item '{shortened(str(item.name))}' of its type '{shortened(str(name))}' has no whole number"
+                ) from None
 
 
 def _version(root: Any) -> str:
