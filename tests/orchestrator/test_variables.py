@@ -430,3 +430,18 @@ def test_a_number_that_a_type_cannot_hold_ends_the_run(tmp_path: Path) -> None:
 def test_a_step_that_ends_early_without_being_allowed_to_is_no_step(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"returned from its step early, at 2\.5 s"):
         _run3(tmp_path, [], early=True)
+
+
+def test_variables_of_our_own_units_are_chosen_alike_directly_and_through_fmus(tmp_path: Path, fmu_dir: Path) -> None:
+    (tmp_path / "s.yaml").write_text(
+        "name: cell\nscene: {geometry: cell}\nunits: {tension: {unit: active_stress}}\nrun: {stop_ms: 3}\n"
+        "output: {every_ms: 3, variables: ['tension.*']}\n"
+    )
+    texts = []
+    for kind in ("native", "fmu"):
+        scenario = load_scenario(tmp_path / "s.yaml", [f"run.participants={kind}"])
+        run_scenario(scenario, tmp_path, tmp_path / kind, fmu_dir=fmu_dir)
+        texts.append((tmp_path / kind / "timeseries.csv").read_text())
+    assert texts[0] == texts[1]
+    # Parameters, texts among them, inputs and outputs, with their units of measure once.
+    assert {"delay_function", "potential[1]_mV", "active_stress[1]_kPa"} <= set(texts[0].splitlines()[0].split(","))
