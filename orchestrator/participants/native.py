@@ -181,7 +181,9 @@ class NativeParticipant:
         if ramps and any(variable.name == INPUT_INTERPOLATION for variable in UNITS[unit].variables()):
             parameters = {INPUT_INTERPOLATION: "linear"} | parameters
         self.inputs, self.outputs = unit_ports(unit, mesh, parameters)
-        known = Ports(self.outputs | self.inputs | _parameter_ports(unit))
+        every = self.outputs | self.inputs | _parameter_ports(unit)
+        # In the order of declaration, as in the unit's FMU.
+        known = Ports({variable.name: every[variable.name] for variable in UNITS[unit].variables()})
         self.observed = known.chosen(observe, f"unit '{name}'")
         self._known = known
         self._unit: Unit = UNITS[unit](mesh)

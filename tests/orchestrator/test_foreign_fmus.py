@@ -236,6 +236,20 @@ def test_an_fmu_that_is_beyond_repair_is_lost(first: Any) -> None:
         body.start(0.05, 0.01)
 
 
+def test_an_fmu_that_takes_no_second_derivatives_gets_the_first_and_says_so_once(
+    simulate: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    settings = ("coupling.interpolation=linear", "coupling.extrapolation=2")
+    capfd.readouterr()
+    lines, _ = simulate(*settings, kinds=("lines", "lines"))
+    notes = [line for line in capfd.readouterr().err.splitlines() if line.startswith("note: ")]
+    assert [note.partition(";")[0] for note in notes] == [
+        f"note: unit '{unit}' takes derivatives of its inputs up to order 1" for unit in ("first", "second")
+    ]
+    # Straight lines, to ends that are known to second order.
+    assert np.abs(_states(lines) - _MASSES.exact(2.0)).max() < 5e-3
+
+
 # --- FMUs that end the process ------------------------------------------------------------------------------------
 
 
