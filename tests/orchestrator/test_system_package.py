@@ -605,7 +605,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         ([], {"resources__damping_dot_ssv": _ssv(F=1)}, ["'F'", "takes a start value"]),
         ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: it is no well-formed XML"]),
         (
-            [('version="1.0" name="two masses"', 'version="2.0" name="two masses"')],
+            [('version="1.0" name="two masses"', 'version="3.0" name="two masses"')],
             {},
             ["SystemStructure.ssd, line 5", "version"],
         ),
