@@ -78,7 +78,14 @@ def _order(system: System) -> list[Component]:
 
 def _start_at_zero(component: Component, inputs: set[str]) -> bool:
     scalars = (scalar for name in inputs for scalar in scalar_names(name, component.inputs[name]))
-    return all(float(component.variables[scalar].start or 0.0) == 0.0 for scalar in scalars)
+    return all(_is_nothing(component.variables[scalar]) for scalar in scalars)
+
+
+def _is_nothing(variable: Any) -> bool:
+    """Whether a variable starts with what its type has for nothing."""
+    if variable.type in ("String", "Boolean"):
+        return variable.start in (None, "", "false", "0")
+    return float(variable.start or 0.0) == 0.0
 
 
 def _instance(system: System, component: Component) -> str:

@@ -105,10 +105,9 @@ def _component(system: System, component: Component) -> Any:
     )
     kinds = {"input": system.linked_inputs(component), "output": _visible_outputs(system, component)}
     connectors = [
-        _SSD.Connector({"name": scalar, "kind": kind}, _SSC.Real(measured))
+        _SSD.Connector({"name": scalar, "kind": kind}, *_type(component, scalar, name, shape))
         for kind, fields in kinds.items()
         for name, shape in fields.items()
-        for measured in [_measured(component, component.unit_of(name, shape))]
         for scalar in scalar_names(name, shape)
     ]
     if connectors:
@@ -116,6 +115,14 @@ def _component(system: System, component: Component) -> Any:
     if component.given:
         element.append(_SSD.ParameterBindings(_SSD.ParameterBinding({"source": _parameter_file(component)})))
     return element
+
+
+def _type(component: Component, scalar: str, name: str, shape: Shape) -> list[Any]:
+    """The element for the type of a connector; an enumeration has none, as the FMU has its items."""
+    kind = component.variables[scalar].type
+    if kind == "Enumeration":
+        return []
+    return [_SSC(kind, _measured(component, component.unit_of(name, shape)) if kind == "Real" else {})]
 
 
 def _visible_outputs(system: System, component: Component) -> dict[str, Shape]:

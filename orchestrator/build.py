@@ -16,7 +16,7 @@ from .errors import InputError
 from .participants.native import Mesh, fmu_of_unit, packed_mesh
 from .scenario import Scenario
 from .system import MESH, beyond_the_standard, system_of
-from .writing import make_folder
+from .writing import allowed, make_folder
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,9 @@ def build_fmus(scenario: Scenario, base: Path, folder: Path, may_be_none: bool =
         for unit in names:
             if mesh is None:
                 raise TypeError("a scenario without a scene has FMUs only")
-            built = fmu_of_unit(unit, mesh, Path(temporary), fmi)
-            fmus[unit] = copyfile(built, folder / built.name)
+            with allowed(folder, "--output"):
+                built = fmu_of_unit(unit, mesh, Path(temporary), fmi)
+                fmus[unit] = copyfile(built, folder / built.name)
     return Built(scenario, base, mesh, folder, fmus)
 
 
@@ -59,22 +60,23 @@ def write_package(built: Built) -> Path:
     """Write the system package `<scenario name>.ssp`; with the mesh, for those that look at fields."""
     extra = {} if built.mesh is None else {MESH: packed_mesh(built.mesh)}
     path = built.folder / f"{built.scenario.name}.ssp"
-    return _written(lambda: write_ssp(built.system, path, beyond_the_standard(built.scenario), extra))
+    return _written(built, lambda: write_ssp(built.system, path, beyond_the_standard(built.scenario), extra))
 
 
 def write_osp_files(built: Built) -> Path:
     """Write the system structure for libcosim, and what belongs to it."""
-    return _written(lambda: write_osp(built.system, built.folder))
+    return _written(built, lambda: write_osp(built.system, built.folder))
 
 
 def write_container_file(built: Built) -> Path:
     """Write what fmucontainer makes one FMU of."""
-    return _written(lambda: write_container(built.system, built.folder))
+    return _written(built, lambda: write_container(built.system, built.folder))
 
 
-def _written(write: Callable[[], Path]) -> Path:
+def _written(built: Built, write: Callable[[], Path]) -> Path:
     try:
-        return write()
+        with allowed(built.folder, "--output"):
+            return write()
     # What does not fit into a file format; the floor below has no other word for it.
     except ValueError as error:
         raise InputError(str(error)) from None

@@ -62,9 +62,10 @@ def run(
             try:
                 outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume, figures)
             except Interrupted as error:
-                print(
-                    f"interrupted; the results so far are in {folder}, to be continued with --resume", file=sys.stderr
+                rest = (
+                    ", to be continued with --resume" if error.resumable else "; no checkpoint was kept to go on from"
                 )
+                print(f"interrupted; the results so far are in {folder}{rest}", file=sys.stderr)
                 raise typer.Exit(INTERRUPTED + error.signal) from None
     for warning in outcome.warnings:
         typer.echo(f"warning: {warning}", err=True)

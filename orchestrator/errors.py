@@ -35,6 +35,8 @@ class Interrupted(Exception):
     def __init__(self, signal: int) -> None:
         super().__init__(f"stopped by signal {signal}")
         self.signal = signal
+        #: Whether the run can be gone on with; known when the results are closed.
+        self.resumable = False
 
 
 class ParticipantError(Exception):

@@ -1,9 +1,8 @@
 """A whole run: scenario in, results folder out."""
 
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +81,9 @@ def _run(
         master = assembly.master
         ready = time.perf_counter()
         unready = None
+        with folder.fitting() if before is not None else nullcontext():
+            kept = None if before is None else before["wall"]
+            wall = WallClock(master.watch, list(assembly.participants), started, ready, kept)
         try:
             if before is None:
                 master.initialise()
@@ -93,7 +95,6 @@ def _run(
                 raise InputError(f"{folder.path}: {error}; run without --resume to begin anew") from error
             unready = error
         # Nothing in the folder was touched up to here.
-        wall = partial(WallClock, master.watch, list(assembly.participants), started, ready)
         recording = folder.record(assembly, before, wall)
         bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
         with recording, bar:

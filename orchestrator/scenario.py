@@ -95,6 +95,8 @@ def _groups(value: Any) -> list[str | int]:
         raise ValueError("expected the name or the number of a group of triangles in the mesh file, or a list of such")
     if any(isinstance(group, int) and abs(group) >= 2**53 for group in groups):
         raise ValueError("expected numbers of groups as a mesh file has them, not one with so many digits")
+    if any(isinstance(group, str) and len(group) > _LONGEST_GROUP for group in groups):
+        raise ValueError(f"expected names of groups of at most {_LONGEST_GROUP} characters")
     return groups
 
 
@@ -111,6 +113,9 @@ def _scale(value: Any) -> Any:
         )
     return value
 
+
+#: Characters in the name of a group in a mesh file.
+_LONGEST_GROUP = 200
 
 #: The units of length that coordinates in a file may be in, in mm, and the factors that may stand in their place.
 _LENGTHS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}

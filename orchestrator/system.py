@@ -1,7 +1,7 @@
 """A scenario as a system of FMUs, for tools that have no scenarios."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence, Set
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -9,10 +9,11 @@ from typing import Any
 from ..fmus.model_description import INPUT_INTERPOLATION
 from ..fmus.system import Component, Link, System
 from .assembly import called_directly, make_participants
-from .coupling.connections import connect
+from .coupling.connections import Connection, connect
 from .errors import InputError
 from .participants.fmu_variables import declares_ramps
 from .participants.native import Mesh
+from .participants.participant import Participant, Ports
 from .scenario import Scenario
 
 _MS_PER_S = 1000.0
@@ -31,33 +32,82 @@ def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[
     with ExitStack() as stack:
         participants = make_participants(stack, called_directly(scenario), base, mesh, described=True)
         connections = connect(participants, scenario.connections, scenario.connect_by_name)
+    split = _split(participants, connections)
     components = []
     for name, entry in scenario.units.items():
+        if entry.fmu is not None and (base / entry.fmu).is_dir():
+            raise InputError(f"units.{name}.fmu: {entry.fmu} is a folder; pack it, for a system is made of files")
         ports = participants[name]
         given: dict[str, Any] = {**entry.parameters, **entry.start}
         component = Component(
             name,
             built[entry.unit] if entry.unit is not None else base / str(entry.fmu),
-            {port.name: port.shape for port in ports.inputs.values()},
-            {port.name: port.shape for port in ports.outputs.values()},
+            _shapes(ports.inputs, {array for unit, array in split["input"] if unit == name}),
+            _shapes(ports.outputs, {array for unit, array in split["output"] if unit == name}),
             given,
         )
         if scenario.coupling.interpolation == "linear" and declares_ramps(component.description.modelVariables):
             given.setdefault(INPUT_INTERPOLATION, "linear")
         components.append(component)
-    links = tuple(
-        Link(
-            link.source.unit,
-            link.source.name,
-            link.target.unit,
-            link.target.name,
-            participants[link.source.unit].outputs[link.source.name].shape,
-            None if link.law is None else (link.law.factor, link.law.offset),
-        )
-        for link in connections
-    )
+    links: list[Link] = []
+    for link in connections:
+        law = None if link.law is None else (link.law.factor, link.law.offset)
+        source = participants[link.source.unit].outputs[link.source.name]
+        target = participants[link.target.unit].inputs[link.target.name]
+        ends = [(source.name, target.name, source.shape)]
+        if (link.source.unit, source.name) in split["output"] or (link.target.unit, target.name) in split["input"]:
+            ends = [(one, other, ()) for one, other in zip(source.elements, target.elements, strict=True)]
+        links += [Link(link.source.unit, one, link.target.unit, other, shape, law) for one, other, shape in ends]
     stop, step = scenario.run.stop_ms / _MS_PER_S, scenario.coupling.step_ms / _MS_PER_S
-    return System(scenario.name, tuple(components), links, stop, step)
+    return System(scenario.name, tuple(components), tuple(links), stop, step)
+
+
+def _split(
+    participants: Mapping[str, Participant], connections: Sequence[Connection]
+) -> dict[str, set[tuple[str, str]]]:
+    """The arrays, by unit and name, inputs and outputs apart, of which other tools are told scalar by scalar.
+
+    Those are arrays of which single elements are connected, which are counted from 0, or whose other end is split.
+    """
+    sides: dict[str, Callable[[Participant], Ports]] = {
+        "input": lambda unit: unit.inputs,
+        "output": lambda unit: unit.outputs,
+    }
+    found = {
+        side: {
+            (name, port.name) for name, unit in participants.items() for port in ports(unit).values() if port.base == 0
+        }
+        for side, ports in sides.items()
+    }
+    while True:
+        before = sum(map(len, found.values()))
+        for link in connections:
+            outputs, inputs = participants[link.source.unit].outputs, participants[link.target.unit].inputs
+            ends = {
+                "output": (link.source.unit, _array(link.source.name, outputs)),
+                "input": (link.target.unit, _array(link.target.name, inputs)),
+            }
+            names = {"output": link.source.name, "input": link.target.name}
+            differ = outputs[link.source.name].shape != inputs[link.target.name].shape
+            if differ or any(ends[side][1] != names[side] or ends[side] in found[side] for side in sides):
+                for side in sides:
+                    found[side].add(ends[side])
+        if sum(map(len, found.values())) == before:
+            return found
+
+
+def _array(name: str, ports: Ports) -> str:
+    """The array that has the element `name`, or `name` itself."""
+    place = None if name in ports else ports.place(name)
+    return name if place is None else place[0].name
+
+
+def _shapes(ports: Ports, split: Set[str]) -> dict[str, tuple[int, ...]]:
+    """The shapes of ports by name; of those that are `split`, of their elements."""
+    shapes: dict[str, tuple[int, ...]] = {}
+    for port in ports.values():
+        shapes |= dict.fromkeys(port.elements, ()) if port.name in split else {port.name: port.shape}
+    return shapes
 
 
 def beyond_the_standard(scenario: Scenario) -> str:

@@ -23,7 +23,7 @@ class WallClock:
         self._units = units
         self._ready = ready
         self._setup = ready - started
-        self._before = {label: float(seconds) for label, seconds in (before or {}).items()}
+        self._before = {label: 0.0 if before is None else float(before[label]) for label in self._used()}
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
@@ -41,6 +41,11 @@ class WallClock:
         }
 
     def _now(self) -> dict[str, float]:
+        used = self._used()
+        return {label: seconds + self._before[label] for label, seconds in used.items()}
+
+    def _used(self) -> dict[str, float]:
+        """By this process alone."""
         total = {"total": time.perf_counter() - self._ready, "setup": self._setup, WAITING: self._watch.total[WAITING]}
         total |= {f"unit {unit}": self._watch.total[unit] for unit in self._units}
-        return {label: seconds + self._before.get(label, 0.0) for label, seconds in total.items()}
+        return total

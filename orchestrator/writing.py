@@ -1,10 +1,14 @@
-"""What the operating system lets us write: refusals before a run, as they concern what the person chose."""
+"""What the operating system does not let us write before a run has begun."""
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import InputError
+from .errors import InputError, RunError
+
+#: No room on the device, for this user, or for so large a file.
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def make_folder(folder: Path, option: str) -> None:
@@ -22,6 +26,7 @@ def allowed(folder: Path, option: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        _raise_if_full(folder, error)
         raise InputError(
             f"the folder {folder} cannot be written ({error.strerror}); choose another with {option}"
         ) from None
@@ -39,6 +44,16 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        _raise_if_full(path, error)
         raise InputError(
-            f"{path} cannot be written ({error.strerror}); remove what is there, make room, or choose another --output"
+            f"{path} cannot be written ({error.strerror}); remove what is there or choose another --output"
+        ) from None
+
+
+def _raise_if_full(path: Path, error: OSError) -> None:
+    """RunError where there is no room: nothing is wrong with what the person chose."""
+    if error.errno in _FULL:
+        raise RunError(
+            f"not all can be written ({error.filename or path}: {error.strerror}); make room, or choose another "
+            "--output"
         ) from None

@@ -116,7 +116,8 @@ class Convergence:
         rates = [
             (norm / self.history[0][name]) ** (1.0 / sweeps)
             for name, norm in self.history[-1].items()
-            if sweeps and self.history[0][name] > 0.0 and (name in self._criteria or name in self._carried)
+            if sweeps and self.history[0][name] > 0.0 and name not in self._exact
+            if name in self._criteria or name in self._carried
         ]
         return max(rates, default=None)
 

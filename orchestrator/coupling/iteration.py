@@ -157,6 +157,10 @@ class Iterated:
                 return before.with_loop(convergence, True)
             if number == 1:
                 self._rescale({end: later[end] for end in carried})
+            if any(residuals[name].any() for name in exact):
+                # After an event the loop is another: nothing that was learned of it holds any more.
+                self._acceleration.forget()
+                continue
             if number < self._limits.max_iterations and carried:
                 following = self._accelerated({end: (earlier[end], later[end]) for end in carried})
                 if not all(np.isfinite(value).all() for value in following.values()):

@@ -40,9 +40,7 @@ class CouplingLog:
         times = [float(row[0]) for row in self._table.rows()]
         self._rows = len(times)
         # First and last row of each stretch of steps that had not converged: what is kept does not grow with it.
-        self._stretches: list[tuple[int, int]] = []
-        if resumed is not None:
-            self._stretches = [(int(first), int(last)) for first, last in resumed["unconverged"].reshape(-1, 2)]
+        self._stretches = [] if resumed is None else stretches(resumed)
         self._unconverged = [time for first, last in self._stretches for time in times[first : last + 1]]
         # The time of the initial values, if they do not agree: they have no row.
         self._unsettled_ms: list[float] = [] if resumed is None else resumed["unsettled_ms"].tolist()
@@ -88,3 +86,8 @@ class CouplingLog:
             self._stretches[-1] = (before[0], self._rows)
         else:
             self._stretches.append((self._rows, self._rows))
+
+
+def stretches(memory: Mapping[str, Any]) -> list[tuple[int, int]]:
+    """First and last row of each stretch of steps that had not converged, from a log's `memory`."""
+    return [(int(first), int(last)) for first, last in memory["unconverged"].reshape(-1, 2)]

@@ -3,7 +3,7 @@
 import csv
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import TracebackType
@@ -91,9 +91,7 @@ class ResultsFolder:
                 f"{_REMEDY}"
             ) from error
 
-    def record(
-        self, assembly: Assembly, before: Memories | None, wall: Callable[[Mapping[str, Any] | None], WallClock]
-    ) -> Recording:
+    def record(self, assembly: Assembly, before: Memories | None, wall: WallClock) -> Recording:
         """Open the files of a run, or go on with those of one that left `before`; see Recording."""
         self._check_places()
         if before is not None:
@@ -111,9 +109,7 @@ class ResultsFolder:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _opened(
-        self, assembly: Assembly, before: Memories | None, wall: Callable[[Mapping[str, Any] | None], WallClock]
-    ) -> Recording:
+    def _opened(self, assembly: Assembly, before: Memories | None, wall: WallClock) -> Recording:
         # First what would let the rest pass for the result of an earlier run.
         remove_stale(self.path / SUMMARY)
         if before is None:

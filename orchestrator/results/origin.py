@@ -84,11 +84,16 @@ class Origin:
                 found.append(f"{name} {'is gone' if gone else 'has changed since'}; restore it")
         for name in sorted({*earlier.versions, *self.versions}):
             before, now = earlier.versions.get(name), self.versions.get(name)
-            if before != now:
+            if before is None or now is None or _counted(name, before) != _counted(name, now):
                 found.append(f"{name} was {before or 'not used'} and is {now or 'not used'}; install what it was")
         if earlier.program != self.program and not found:
             found.append("this program has changed since; take the version that began the run")
         return found
+
+
+def _counted(name: str, version: str) -> str:
+    """As much of a version as bits may depend on: of Python's the first two numbers."""
+    return ".".join(version.split(".")[:2]) if name == "python" else version
 
 
 def _differences(one: Any, other: Any, key: str = "") -> list[str]:

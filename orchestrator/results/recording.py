@@ -1,6 +1,6 @@
 """A run on its way into its folder: all that is written of it, in the order in which a process may end anywhere."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import asdict
 from pathlib import Path
@@ -14,7 +14,7 @@ from ..errors import InputError, Interrupted, RunError, Terminated
 from ..wall_clock import WallClock
 from .appended import check
 from .checkpoint import Checkpoint, Memories
-from .coupling_log import CouplingLog
+from .coupling_log import CouplingLog, stretches
 from .fields import Fields
 from .iteration_log import IterationLog
 from .names import COUPLING, FMU_LOG, ITERATIONS, PARTS, SUMMARY, TIME_SERIES
@@ -46,8 +46,6 @@ class Recording:
     ----------
     before:
         What an earlier process left in the same folder to go on from.
-    wall:
-        Makes the clock, from what an earlier process kept of it.
 
     Attributes
     ----------
@@ -61,17 +59,21 @@ class Recording:
         origin: Origin,
         assembly: Assembly,
         before: Memories | None,
-        wall: Callable[[Mapping[str, Any] | None], WallClock],
+        wall: WallClock,
     ) -> None:
         self.summary: dict[str, Any] = {}
         self._refusal: RunError | None = None
         self._folder, self._origin, self._assembly = folder, origin, assembly
-        kept = before or {}
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
+        self._wall = wall
         self._fields: Fields | None = None
         self._iterations: IterationLog | None = None
         # The fields first: a value that is not finite ends the step before the time series has a row of it.
         recorders: dict[str, Recorder] = {}
+
+        def kept(name: str) -> Any:
+            return None if before is None else before[name]
+
         with ExitStack() as opened:
 
             def add(name: str, recorder: Any) -> Any:
@@ -79,16 +81,15 @@ class Recording:
                 return recorder
 
             if assembly.mesh is not None:
-                self._fields = add("fields", Fields(folder, participants, assembly.mesh, kept.get("fields")))
-            series = TimeSeries(folder, participants, assembly.probes, kept.get("series"))
+                self._fields = add("fields", Fields(folder, participants, assembly.mesh, kept("fields")))
+            series = TimeSeries(folder, participants, assembly.probes, kept("series"))
             self._series: TimeSeries = add("series", series)
             converged, adaptive = list(assembly.converged), scenario.coupling.adaptive is not None
-            log = CouplingLog(folder, master.units, converged, adaptive, kept.get("log"))
+            log = CouplingLog(folder, master.units, converged, adaptive, kept("log"))
             self._log: CouplingLog = add("log", log)
             if converged:
-                self._iterations = add("iterations", IterationLog(folder, converged, kept.get("iterations")))
+                self._iterations = add("iterations", IterationLog(folder, converged, kept("iterations")))
             self._profile = opened.enter_context(closing(Profile(folder, list(participants))))
-            self._wall = wall(kept.get("wall"))
             opened.pop_all()
         for participant in participants.values():
             participant.log_to((folder / FMU_LOG).absolute())
@@ -104,6 +105,7 @@ class Recording:
         """Whether all is there that `before` goes on from; DamagedFile if not. Nothing is touched."""
         check(folder / TIME_SERIES, before["series"])
         check(folder / COUPLING, before["log"]["table"])
+        stretches(before["log"])
         if "iterations" in before:
             check(folder / ITERATIONS, before["iterations"])
         if "fields" in before:
@@ -141,6 +143,8 @@ class Recording:
         ending = self._ending(error, problems)
         done = ending is None
         resumable = self._checkpoint.exists and not done
+        if isinstance(error, Interrupted):
+            error.resumable = resumable
         outcome = _outcome(ending) | {
             "unconverged_ms": self._log.unconverged,
             "tolerance_missed": asdict(self._assembly.master.missed),

@@ -1,6 +1,7 @@
 """If these fail, an FMU is stale, half written, not reproducible, or building it disturbs the program that builds."""
 
 import io
+import random
 import subprocess
 import sys
 import zipfile
@@ -107,6 +108,33 @@ def test_without_a_folder_it_is_the_users_cache(tiny: Mesh, tmp_path: Path, monk
     path = cache.cached_fmu(_UNIT, tiny)
     assert path.is_relative_to(tmp_path / "cardiac-cosim")
     assert path.is_file()
+
+
+def test_a_damaged_fmu_in_the_cache_is_built_anew(tiny: Mesh, tmp_path: Path) -> None:
+    path = cache.cached_fmu(_UNIT, tiny, tmp_path)
+    good = path.read_bytes()
+    chance = random.Random(4)
+    damaged = [good[:size] for size in (0, 1000, len(good) // 2, len(good) - 1)]
+    with zipfile.ZipFile(path) as archive:
+        members = [(member.header_offset + 100, member.compress_size - 100) for member in archive.infolist()]
+    for begin, size in chance.choices([(begin, size) for begin, size in members if size > 0], k=8):
+        place = begin + chance.randrange(size)
+        damaged.append(good[:place] + bytes([good[place] ^ 4]) + good[place + 1 :])
+    for content in damaged:
+        path.write_bytes(content)
+        assert cache.cached_fmu(_UNIT, tiny, tmp_path) == path
+        assert path.read_bytes() == good
+    assert [member.name for member in path.parent.iterdir()] == [path.name]
+
+
+def test_without_a_home_nothing_is_built_where_the_person_is(
+    tiny: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cache, "user_cache_path", lambda name: Path("~/.cache") / name)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OSError, match="no home folder"):
+        cache.cached_fmu(_UNIT, tiny)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_any_other_content_is_another_file(tiny: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -174,6 +175,55 @@ def test_a_frame_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
     assert again.times == [1.0]
     with again.open(0) as frame:
         assert frame["x"][:].tolist() == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("coupling", ["coupling.step_ms=1", _ITERATED], ids=["explicit", "adaptive and iterated"])
+def test_killed_fifty_times_at_random_moments_of_its_whole_life_nothing_is_lost_and_nothing_left(
+    coupling: str, small_scenario: Path, tmp_path: Path
+) -> None:
+    sets = (coupling, "run.participants=native", "run.stop_ms=60", "output.every_ms=2", "run.checkpoint_every=3")
+    _run(small_scenario, tmp_path / "whole", *sets)
+    files = {path.name for path in (tmp_path / "whole").iterdir()}
+    out = tmp_path / "killed"
+    command = [*_command(small_scenario, out, *sets), "--resume"]
+    chance = random.Random(coupling)
+    begun = time.monotonic()
+    subprocess.run(command, check=True, capture_output=True)
+    life = time.monotonic() - begun
+    shutil.rmtree(out)
+    deaths = completions = 0
+    while deaths < 50:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        # The end, where files are completed and removed, is the most delicate.
+        time.sleep(chance.choice([chance.uniform(0.3, 1.0), chance.uniform(0.6, 1.0), 0.9]) * life)
+        process.kill()
+        _, told = process.communicate()
+        assert process.returncode in (0, -signal.SIGKILL), told
+        deaths += process.returncode != 0
+        for path in (out / "fields.h5", out / "timeseries.csv"):
+            if path.is_file():
+                _readable(path)
+        done = (out / "summary.json").is_file() and json.loads((out / "summary.json").read_text())["status"] == "done"
+        if done:
+            assert _run(small_scenario, out, *sets, resume=True)["status"] == "done"
+            assert _content(out) == _content(tmp_path / "whole")
+            assert {path.name for path in out.iterdir()} == files
+            completions += 1
+            shutil.rmtree(out)
+    _run(small_scenario, out, *sets, resume=True)
+    assert _content(out) == _content(tmp_path / "whole")
+    assert {path.name for path in out.iterdir()} == files
+    assert completions > 0
+
+
+def _readable(path: Path) -> None:
+    if path.suffix == ".csv":
+        assert np.isfinite(np.genfromtxt(path, delimiter=",", skip_header=1)).all()
+        return
+    with h5py.File(path) as file:
+        for name in file["frames"]:
+            assert np.isfinite(file[f"frames/{name}"][:]).all()
 
 
 @pytest.mark.long

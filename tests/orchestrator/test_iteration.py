@@ -268,6 +268,49 @@ def test_both_schemes_agree_on_a_heart_whatever_field_is_named(small_scenario: P
         np.testing.assert_allclose(volume(scheme, field), expected, atol=2e-3, err_msg=f"{scheme}, {field}")
 
 
+# --- values that change at events ---------------------------------------------------------------------------------
+
+
+def _switched(fake: Any, port: Any, closes: Callable[[float], bool]) -> dict[str, Any]:
+    """y = 0.6 + 0.3 on, and `on` by what a relay `closes` at."""
+
+    def level(given: Any, *_: Any) -> dict[str, Any]:
+        return {"y": 0.6 + 0.3 * given["on"]}
+
+    def relay(given: Any, *_: Any) -> dict[str, Any]:
+        return {"on": float(closes(float(given["y"])))}
+
+    on = port("on", type="Boolean", discrete=True)
+    return {
+        "a": fake("a", [on], [port("y")], law=level, initially=lambda given: {"y": 0.6}),
+        "b": fake("b", [port("y")], [on], law=relay),
+    }
+
+
+@pytest.mark.parametrize("acceleration", [Relaxation(1.0), Aitken(0.5), Anderson(0.1)])
+@pytest.mark.parametrize("scheme", ["jacobi", "gauss-seidel"])
+def test_a_loop_with_a_switch_has_converged_when_that_rests(
+    scheme: str, acceleration: Acceleration, fake: Any, port: Any
+) -> None:
+    units = _switched(fake, port, lambda y: y > 0.5)
+    connections = connect(units, [])
+    limits = Limits({"a.y": Criterion(relative=1e-9)}, 60, True)
+    iterated = Iterated(SCHEMES[scheme](), units, connections, acceleration, limits)
+    master = Master(units, connections, iterated, Timeline.of_fixed_step(1.0, 1.0, 1.0))
+    master.run([])
+    assert float(master.exchange.value("a", "y")) == pytest.approx(0.9, rel=1e-8)
+    assert float(master.exchange.value("b", "on")) == 1.0
+
+
+def test_a_switch_that_never_rests_is_no_convergence(fake: Any, port: Any) -> None:
+    units = _switched(fake, port, lambda y: y < 0.7)
+    connections = connect(units, [])
+    limits = Limits({"a.y": Criterion(relative=10.0)}, 20, True)
+    iterated = Iterated(SCHEMES["gauss-seidel"](), units, connections, Relaxation(1.0), limits)
+    with pytest.raises(RunError, match=r"no convergence in 20 sweeps: b\.on"):
+        Master(units, connections, iterated, Timeline.of_fixed_step(1.0, 1.0, 1.0)).run([])
+
+
 # --- initial values -----------------------------------------------------------------------------------------------
 
 

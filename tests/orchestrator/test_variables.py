@@ -337,3 +337,65 @@ def test_all_that_an_fmu_logs_is_in_a_file(simulate: Simulate, tmp_path: Path) -
     # What is there of an earlier run does not pass for this one's.
     simulate(_ALL)
     assert not log.exists()
+
+
+_NUMBERS = ["Float32", "Float64", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))]
+
+
+def _declared3() -> str:
+    """Every type of FMI 3.0 as input `u`, output `y`, and as an array of three of each, `us` and `ys`."""
+    lines = []
+    for kind in [*_NUMBERS, "Boolean", "String"]:
+        start = {"Boolean": "false", "String": ""}.get(kind, "0")
+        for place, (name, causality) in enumerate((("u", "input"), ("y", "output"), ("us", "input"), ("ys", "output"))):
+            # In FMI 3.0 value references are unique over all types, which is nothing to this library.
+            extra = "" if kind in ("Float32", "Float64") else ' variability="discrete"'
+            begin = f' start="{start}"' if causality == "input" and kind != "String" else ""
+            inside = '<Dimension start="3"/>' if name.endswith("s") else ""
+            lines.append(
+                f'<{kind} name="{name}{kind}" valueReference="{place}" causality="{causality}"{extra}{begin}>'
+                f"{inside}</{kind}>"
+            )
+    return "".join(lines)
+
+
+def _run3(folder: Path, connections: list[str], *sets: str, early: bool = False) -> list[dict[str, str]]:
+    for unit in "ab":
+        _builder.build_box3(folder / f"{unit}.fmu", _declared3(), early)
+    (folder / "s.yaml").write_text(
+        "name: s\nunits: {a: {fmu: a.fmu}, b: {fmu: b.fmu}}\nconnect_by_name: false\ncoupling: {step_ms: 1000}\n"
+        f"run: {{stop_ms: 3000}}\noutput: {{every_ms: 3000}}\nconnections: {json.dumps(connections)}\n"
+    )
+    run_scenario(load_scenario(folder / "s.yaml", sets), folder, folder / "out")
+    with (folder / "out" / "timeseries.csv").open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_all_types_of_fmi_3_are_exchanged_and_recorded(tmp_path: Path) -> None:
+    kinds = [*_NUMBERS, "Boolean", "String"]
+    links = [f"a.y{kind} -> b.u{kind}" for kind in kinds] + [f"a.ys{kind} -> b.us{kind}" for kind in kinds]
+    row = _run3(tmp_path, links)[-1]
+    for kind in kinds:
+        expected = {"Boolean": ("1", "0"), "String": ("<>", "<<>>")}.get(kind, ("1", "2"))
+        if kind.startswith("Float"):
+            expected = ("1.0", "2.0")
+        assert (row[f"a.y{kind}"], row[f"b.y{kind}"]) == expected
+        assert (row[f"a.ys{kind}[3]"], row[f"b.ys{kind}[3]"]) == expected
+
+
+def test_elements_of_arrays_of_fmi_3_are_set_without_touching_the_others(tmp_path: Path) -> None:
+    links = ["a.yFloat64 -> b.usFloat64[2]", "a.ysInt32[1] -> b.usInt64[3]", "a.yUInt8 -> b.uFloat32"]
+    row = _run3(tmp_path, links, "units.b.start={usFloat64: 5}")[-1]
+    assert [row[f"b.ysFloat64[{place}]"] for place in (1, 2, 3)] == ["6.0", "2.0", "6.0"]
+    assert [row[f"b.ysInt64[{place}]"] for place in (1, 2, 3)] == ["1", "1", "2"]
+    assert row["b.yFloat32"] == "2.0"
+
+
+def test_a_number_that_a_type_cannot_hold_ends_the_run(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="'uInt8' of type Int8 cannot be 201"):
+        _run3(tmp_path, ["a.yInt32 -> b.uInt8"], "units.a.start={uInt32: 200}")
+
+
+def test_a_step_that_ends_early_without_being_allowed_to_is_no_step(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match=r"returned from its step early, at 2\.5 s"):
+        _run3(tmp_path, [], early=True)

@@ -9,6 +9,7 @@ import pytest
 from cardiac_cosim.units.errors import InvalidInput
 from cardiac_cosim.units.geometry import registry
 from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.mesh.faces import row_keys
 from cardiac_cosim.units.mesh.file import read_mesh, write_mesh
 from cardiac_cosim.units.mesh.finite_elements import interpolation, linear_basis
 from cardiac_cosim.units.mesh.quality import signed_inverse_condition_number
@@ -80,6 +81,31 @@ def test_missing_boundary_names_those_there_are() -> None:
         (_POINTS * [1, 1, 0], _CELLS, "inverted or flat"),
         (_POINTS, _CELLS[:1], "1 nodes belong to no element, the first is node 4"),
         (np.vstack([_POINTS[:4], _POINTS[:4] + 9]), np.array([[0, 1, 2, 3], [4, 5, 6, 7]]), "falls into 2 pieces"),
+        (_POINTS * 1e12, _CELLS, r"node 1 has a coordinate beyond 1e\+09 mm"),
+        (_POINTS, np.vstack([_CELLS, _CELLS[:1]]), "1 of 3 elements are listed twice"),
+        (_POINTS, np.vstack([_CELLS, _CELLS[:1, [1, 2, 0, 3]]]), "1 of 3 elements are listed twice"),
+        # A second top on the same triangle, above it as the first is.
+        (
+            np.vstack([_POINTS, [[2, 2, 2]]]),
+            np.vstack([_CELLS, [[1, 2, 3, 5]]]),
+            "overlap: 1 faces are shared by three",
+        ),
+        (
+            np.vstack([_POINTS[:4], [[-1, -1, -1]]]),
+            np.array([[0, 1, 2, 3], [4, 1, 2, 3]]),
+            "overlap: at 1 faces both elements lie on the same side",
+        ),
+        # Two tetrahedra that share a node, and an edge.
+        (
+            np.vstack([_POINTS[:4], -_POINTS[1:4]]),
+            np.array([[0, 1, 2, 3], [0, 5, 4, 6]]),
+            "2 parts .* by nodes only.* 1 n",
+        ),
+        (
+            np.vstack([_POINTS[:4], [[-1, 0, 0], [0, -1, 0]]]),
+            np.array([[0, 1, 2, 3], [0, 4, 5, 3]]),
+            "by nodes only.* 2 n",
+        ),
     ],
 )
 def test_unsound_meshes_are_refused(points: np.ndarray, cells: np.ndarray, message: str) -> None:
@@ -89,11 +115,29 @@ def test_unsound_meshes_are_refused(points: np.ndarray, cells: np.ndarray, messa
 
 @pytest.mark.parametrize(
     ("faces", "message"),
-    [([], "has no face"), ([[1, 2, 3]], "not on the surface"), ([[0, 1, 4]], "not on the surface")],
+    [
+        ([], "has no face"),
+        ([[1, 2, 3]], "not on the surface"),
+        ([[0, 1, 4]], "not on the surface"),
+        ([[0, 1, 2], [0, 1, 7]], "not on the surface"),
+        ([[0, 1, 2], [0, 1, -1]], "not on the surface"),
+        ([[0, 1, 2], [2, 0, 1]], "listed twice"),
+    ],
 )
 def test_unsound_boundaries_are_refused(faces: list[list[int]], message: str) -> None:
     with pytest.raises(InvalidInput, match=f"'wrong'.*{message}"):
         _pair(wrong=faces)
+
+
+def test_rows_of_the_same_numbers_have_the_same_key_however_many_nodes_there_are() -> None:
+    rows = np.random.default_rng(3).integers(0, 2**40, (500, 3))
+    rows = np.vstack([rows, rows[:, [2, 0, 1]], np.sort(rows, axis=1)])
+    for below in (2**40, 2**50):
+        keys = row_keys(rows, below).reshape(3, 500)
+        assert (keys == keys[0]).all()
+        assert len(np.unique(keys)) == 500
+        ordered = np.lexsort(np.sort(rows[:500], axis=1).T[::-1])
+        np.testing.assert_array_equal(np.argsort(keys[0]), ordered)
 
 
 # --- files ---------------------------------------------------------------------------------------------------------

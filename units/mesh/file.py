@@ -1,5 +1,6 @@
 """Meshes on disk: gmsh's own format, any other that meshio reads, and this project's own archives."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,12 @@ _TAG = "gmsh:physical"
 
 #: Where in a file of gmsh's own format its head is, comments before it included.
 _HEAD_WITHIN = 65536
+
+#: A file of more bytes holds more elements than can be computed with.
+_LARGEST_BYTES = 2 * 10**9
+
+#: What an archive may unpack to: so many bytes, and more for each of its own. Meshes compress to a third or so.
+_ARCHIVE_BYTES, _ARCHIVE_RATIO = 10**8, 20
 
 
 def read_mesh(path: Path, naming: Naming | None = None, scale: float = 1.0) -> Mesh:
@@ -49,6 +56,10 @@ def _from_archive(path: Path, naming: Naming | None, scale: float) -> Mesh:
     if naming:
         raise InvalidInput("an archive has its boundaries by their own names; remove scene.boundaries")
     try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > _ARCHIVE_BYTES + _ARCHIVE_RATIO * path.stat().st_size:
+            raise InvalidInput(f"unpacks to {size / 1e6:.0f} MB, far more than any mesh of its size; write it anew")
         mesh = unpack_mesh(path)
     except InvalidInput:
         raise
@@ -59,6 +70,9 @@ def _from_archive(path: Path, naming: Naming | None, scale: float) -> Mesh:
 
 
 def _stored(path: Path) -> StoredMesh:
+    size = path.stat().st_size
+    if size > _LARGEST_BYTES:
+        raise UnreadableMesh(f"has {size / 1e9:.1f} GB, more than any mesh of a heart; choose larger elements")
     try:
         with path.open("rb") as file:
             if HEAD not in file.read(_HEAD_WITHIN):

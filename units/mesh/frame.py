@@ -76,17 +76,17 @@ def frame_warnings(mesh: Mesh, unit_is_stated: bool) -> Iterator[str]:
     if not unit_is_stated and not low <= np.ptp(mesh.points, axis=0).max() <= high:
         yield f"{_size(mesh)}; is it in another unit of length than mm? Then state scene.scale"
     yield from _coincident(mesh)
-    if not is_heart(mesh) or "base" not in mesh.boundaries:
+    if "base" not in mesh.boundaries:
         return
     normal, height, level = _base(mesh)
     if normal[2] < _TILTED:
-        yield f"the base is tilted by {np.degrees(np.arccos(normal[2])):.0f} degrees; {_FRAME}"
+        yield f"the base is tilted by {np.degrees(np.arccos(np.clip(normal[2], -1.0, 1.0))):.0f} degrees; {_FRAME}"
     if abs(level) > _OFF * height:
         yield f"the base lies at Z = {level:.3g} mm; {_FRAME}"
     above = float(mesh.points[:, 2].max()) - level
     if above > _OFF * height:
         yield f"the mesh reaches {above:.3g} mm above its base; {_FRAME}"
-    if "lv_endocardium" in mesh.boundaries:
+    if is_heart(mesh) and "lv_endocardium" in mesh.boundaries:
         yield from _sideways(mesh)
 
 

@@ -18,8 +18,11 @@ from .stored import StoredMesh, UnreadableMesh, by_number
 
 _CHILD = Path(__file__).with_name("meshio_child.py")
 
+_REMEDY = "write it anew, best as gmsh's .msh"
+
 #: Seconds of a processor that any file gets, and more for each megabyte; so long in all at most, on a busy machine.
-_SECONDS, _SECONDS_PER_MB, _PATIENCE = 6.0, 2.0, 5.0
+_SECONDS, _SECONDS_PER_MB, _PATIENCE = 4.0, 2.0, 5.0
+_LONGEST_SECONDS = 900.0
 #: Bytes of memory that any file gets, and more for each byte in it.
 _MEMORY, _MEMORY_PER_BYTE = 2 * 2**30, 50
 
@@ -32,7 +35,7 @@ def read_by_meshio(path: Path) -> StoredMesh:
             _run_child(path.resolve(), Path(folder), size)
             found = json.loads((Path(folder) / "found.json").read_text(encoding="utf-8"))
             if "error" in found:
-                raise UnreadableMesh(f"meshio cannot read it as a mesh ({found['error']})")
+                raise UnreadableMesh(f"meshio cannot read it as a mesh ({found['error']}); {_REMEDY}")
             with np.load(Path(folder) / "found.npz", allow_pickle=False) as arrays:
                 return StoredMesh(
                     arrays["points"],
@@ -47,7 +50,7 @@ def read_by_meshio(path: Path) -> StoredMesh:
 
 
 def _run_child(path: Path, folder: Path, size: int) -> None:
-    seconds = _SECONDS + _SECONDS_PER_MB * size / 1e6
+    seconds = min(_SECONDS + _SECONDS_PER_MB * size / 1e6, _LONGEST_SECONDS)
     memory = _MEMORY + _MEMORY_PER_BYTE * size
     command = [sys.executable, "-P", str(_CHILD), str(path), str(folder), str(round(seconds)), str(memory)]
     try:
@@ -72,4 +75,4 @@ def _run_child(path: Path, folder: Path, size: int) -> None:
             if code < 0
             else f"it ends with exit code {code}"
         )
-        raise UnreadableMesh(f"meshio cannot read it as a mesh ({reason}); write it anew, best as gmsh's .msh")
+        raise UnreadableMesh(f"meshio cannot read it as a mesh ({reason}); {_REMEDY}")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..arrays import IntArray
-from ..errors import InvalidInput
+from ..errors import InvalidInput, listed
 from .stored import StoredMesh
 
 #: The boundaries that the units know.
@@ -15,8 +15,8 @@ BOUNDARIES = ("base", "epicardium", "endocardium", "lv_endocardium", "rv_endocar
 #: Names or numbers of what makes up each boundary.
 Naming = Mapping[str, Sequence[str | int]]
 
-#: Names or numbers of a file that a message lists.
-_LISTED = 20
+#: Numbers of a file that a message lists, and characters in the name of a group.
+_LISTED, _LONGEST = 20, 200
 
 
 def named_faces(stored: StoredMesh, naming: Naming) -> dict[str, IntArray]:
@@ -28,9 +28,12 @@ def named_faces(stored: StoredMesh, naming: Naming) -> dict[str, IntArray]:
     Raises
     ------
     InvalidInput
-        For groups without triangles, names and numbers that the file does not have, numbers that several arrays have
-        and mean different faces by, and a file without names and `naming`.
+        For groups without triangles or with endless names, names and numbers that the file does not have, numbers that
+        several arrays have and mean different faces by, and a file without names and `naming`.
     """
+    longest = max(map(len, stored.named), default=0)
+    if longest > _LONGEST:
+        raise InvalidInput(f"has a group with a name of {longest} characters; give it one of at most {_LONGEST}")
     for name in naming:
         if name not in BOUNDARIES:
             near = difflib.get_close_matches(name, BOUNDARIES, n=1)
@@ -68,10 +71,9 @@ def _gathered(stored: StoredMesh, boundary: str, groups: Sequence[str | int]) ->
             if group not in stored.named:
                 near = difflib.get_close_matches(group, stored.named, n=1)
                 hint = f"; did you mean '{near[0]}'?" if near else ""
-                have = ", ".join(sorted(stored.named)) or "none"
                 raise InvalidInput(
-                    f"scene.boundaries.{boundary}: there is no group of triangles named '{group}' (there is: {have})"
-                    f"{hint}"
+                    f"scene.boundaries.{boundary}: there is no group of triangles named '{group}' "
+                    f"(there is: {listed(stored.named)}){hint}"
                 )
             found.append(stored.named[group])
         else:
@@ -100,8 +102,8 @@ def _with_number(stored: StoredMesh, boundary: str, number: int, groups: Sequenc
 def _numbers(stored: StoredMesh) -> str:
     """The arrays of numbers, for a message."""
     described = []
-    for name, members in stored.numbered.items():
+    for name, members in list(stored.numbered.items())[:_LISTED]:
         numbers = sorted(members)
         dots = ", ..." if len(numbers) > _LISTED else ""
-        described.append(f"'{name}': {', '.join(map(str, numbers[:_LISTED]))}{dots}")
+        described.append(f"'{name[:_LONGEST]}': {', '.join(map(str, numbers[:_LISTED]))}{dots}")
     return "; ".join(described)

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..errors import InvalidInput
+from ..errors import InvalidInput, listed
 from .faces import Faces, faces_of, row_keys
 
+#: A coordinate that nothing can be computed with: a thousand kilometres, in mm.
+_FARTHEST_MM = 1e9
 _KINDS = {0: "points", 1: "lines", 2: "triangles", 3: "tetrahedra"}
 
 
@@ -38,9 +40,9 @@ class Mesh:
     Raises
     ------
     InvalidInput
-        For coordinates that are not finite, node numbers out of range, inverted or flat elements, elements listed
-        twice or overlapping, nodes without an element, elements that do not hang together by their faces, and
-        boundary faces that are not on the surface or listed twice.
+        For coordinates that are not finite or beyond reason, node numbers out of range, inverted or flat elements,
+        elements listed twice or overlapping, nodes without an element, elements that do not hang together by their
+        faces, and boundary faces that are not on the surface or listed twice.
     """
 
     points: FloatArray
@@ -101,10 +103,10 @@ class Mesh:
     def boundary(self, name: str) -> IntArray:
         """Faces of the boundary `name`, shape (faces, 3), normals outward; InvalidInput if the mesh has none."""
         if name not in self.boundaries:
-            have = ", ".join(sorted(self.boundaries)) or "none"
             raise InvalidInput(
-                f"the mesh has no boundary named '{name}' (it has: {have}); "
-                f"name that part of the surface by a physical group '{name}'"
+                f"the mesh has no boundary named '{name}' (it has: {listed(self.boundaries)}); "
+                f"name that part of the surface by a physical group '{name}', or say which groups of the file it is by "
+                "scene.boundaries"
             )
         return self.boundaries[name]
 
@@ -123,6 +125,11 @@ class Mesh:
             )
         if not np.isfinite(points).all():
             raise InvalidInput(f"node {_first(~np.isfinite(points).all(axis=1))} has a coordinate that is not finite")
+        if np.abs(points).max() > _FARTHEST_MM:
+            far = _first(np.abs(points).max(axis=1) > _FARTHEST_MM)
+            raise InvalidInput(
+                f"node {far} has a coordinate beyond {_FARTHEST_MM:g} mm, {points[far].tolist()}; correct it"
+            )
         if cells.min() < 0 or cells.max() >= len(points):
             raise InvalidInput(f"an element names a node outside 0..{len(points) - 1}")
         flat = points[:, self.dimension :]

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import IntArray
-from ..errors import InvalidInput
+from ..errors import InvalidInput, listed
 from .cavity import checked_rim, rim_of
 from .faces import row_keys
 from .simplices import Mesh
@@ -52,7 +53,7 @@ def wall_of(mesh: Mesh) -> Wall:
     ------
     InvalidInput
         Where its boundaries are no partition of the surface: a face in two of them, or, unless it is a piece of wall,
-        in none; where an `endocardium` hides a cavity, or a cavity is none.
+        in none; where an `endocardium` hides a cavity, a cavity is none, or the septum is not between the two.
     """
     have = set(mesh.boundaries)
     if _RIGHT & have:
@@ -73,6 +74,8 @@ def wall_of(mesh: Mesh) -> Wall:
         _check_complete(mesh, faces, wall, names)
         for surfaces in wall.cavities.values():
             checked_rim(mesh, surfaces)
+        if wall is _BOTH_VENTRICLES:
+            _check_septum(mesh)
     return wall
 
 
@@ -124,6 +127,19 @@ def _check_union(faces: Mapping[str, IntArray], wall: Wall) -> None:
         )
 
 
+def _check_septum(mesh: Mesh) -> None:
+    """The right cavity's volume does not depend on which of its sides is the septum, but the fibres do."""
+    left = cKDTree(mesh.points[mesh.boundary_nodes("lv_endocardium")])
+    septum, free = (
+        left.query(mesh.points[mesh.boundary(name)].mean(axis=1))[0].mean() for name in ("rv_septum", "rv_endocardium")
+    )
+    if septum > free:
+        raise InvalidInput(
+            f"'rv_septum' lies farther from the left cavity than 'rv_endocardium' ({septum:.3g} and {free:.3g} mm on "
+            "average); exchange their names"
+        )
+
+
 def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names: tuple[str, ...]) -> None:
     """Every face of the surface is in one of the anatomy's boundaries."""
     left = np.setdiff1d(faces[""], np.concatenate([faces[name] for name in names]))
@@ -131,7 +147,7 @@ def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names
         return
     held = {name: len(np.intersect1d(left, faces[name])) for name in mesh.boundaries if name not in names}
     groups = [f"{count} in '{name}'" for name, count in held.items() if count]
-    where = f" ({', '.join(groups)})" if groups else ""
+    where = f" ({listed(groups)})" if groups else ""
     missing = [name for name in wall.boundaries if name not in names]
     if wall is _LEFT_VENTRICLE:
         missing += sorted(_RIGHT)
@@ -140,7 +156,7 @@ def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names
     remedy = (
         f"scene: {{boundaries: {{epicardium: [epicardium, {most}]}}}} joins two groups"
         if where
-        else "name that part of the surface by a physical group"
+        else "name that part of the surface by a physical group, or by scene.boundaries"
     )
     raise InvalidInput(
         f"{len(left)} of {len(faces[''])} faces of the surface are none of {', '.join(names)}{where}{lacks}; give each "

@@ -1,4 +1,4 @@
-"""Builds FMUs of box.c with the C compiler of the machine: one library under any description."""
+"""Builds FMUs of box.c and box3.c with the C compiler of the machine: one library under any description."""
 
 import shutil
 import subprocess
@@ -24,14 +24,12 @@ def compiler() -> str | None:
 
 
 @cache
-def library(talks: bool = False) -> Path:
+def library(source: str = "box.c", *flags: str) -> Path:
     """The compiled library, in a folder that goes with the machine's other temporary files."""
     path = Path(mkdtemp(prefix="box-")) / f"box{sysconfig.get_config_var('SHLIB_SUFFIX') or '.so'}"
     headers = Path(fmpy.__file__).parent / "c-code"
-    flags = ["-DTALKS"] if talks else []
-    source = Path(__file__).with_name("box.c")
-    command = [str(compiler()), "-O1", "-w", "-shared", "-fPIC", f"-I{headers}", *flags, str(source), "-o", str(path)]
-    subprocess.run(command, check=True)
+    command = [str(compiler()), "-O0", "-w", "-std=gnu11", "-shared", "-fPIC", f"-I{headers}", *flags]
+    subprocess.run([*command, str(Path(__file__).with_name(source)), "-o", str(path)], check=True)
     return path
 
 
@@ -55,7 +53,7 @@ def build_box(
         f'canGetAndSetFMUstate="true" canSerializeFMUstate="true" {attributes}/>{head}'
         f"<ModelVariables>{''.join(lines)}</ModelVariables><ModelStructure/></fmiModelDescription>"
     )
-    binary = library(talks)
+    binary = library("box.c", *(["-DTALKS"] if talks else []))
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
         archive.write(binary, f"binaries/{platform}/{binary.name}")
@@ -71,3 +69,17 @@ def _variable(name: str, kind: str, causality: str, reference: int, outer: str =
         f'<ScalarVariable name={quoteattr(name)} valueReference="{reference}" causality="{causality}" {outer}>'
         f"<{kind} {inner}/></ScalarVariable>"
     )
+
+
+def build_box3(path: Path, variables: str, early: bool = False) -> Path:
+    """Write an FMU of FMI 3.0 that declares `variables`, the content of ModelVariables, to `path`."""
+    text = (
+        '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="3.0" modelName="box" '
+        'instantiationToken="box"><CoSimulation modelIdentifier="box" canHandleVariableCommunicationStepSize="true"/>'
+        f"<ModelVariables>{variables}</ModelVariables><ModelStructure/></fmiModelDescription>"
+    )
+    binary = library("box3.c", f"-DEARLY={int(early)}")
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+        archive.write(binary, f"binaries/{fmpy.platform_tuple}/{binary.name}")
+    return path
