@@ -40,7 +40,11 @@ _LONGEST_PROBLEM = 300
 
 def unpack(path: Path, folder: Path) -> Any:
     """Unpack the package at `path` into `folder`, and return the root of its system structure."""
-    if not path.exists():
+    try:
+        missing = not path.exists()
+    except OSError as error:
+        raise InputError(f"it cannot be read ({error.strerror})") from None
+    if missing:
         raise InputError("no such file")
     try:
         with open_archive(path) as archive:
