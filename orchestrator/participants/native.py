@@ -59,7 +59,8 @@ def check_mesh(mesh: Mesh, scene: Scene, folder: Path, units: Collection[str]) -
     A mesh file's path is in front of what is wrong with it.
     """
     try:
-        check_frame(mesh, scene.scale is not None)
+        if units:
+            check_frame(mesh, scene.scale is not None)
         for unit in units:
             UNITS[unit].check_mesh(mesh)
     except InvalidInput as error:

@@ -123,8 +123,12 @@ def _coincident(mesh: Mesh) -> Iterator[str]:
     """Nodes that another mesher would have made one: the tissue is torn between them."""
     nodes = np.unique(mesh.surface)
     points = mesh.points[nodes]
-    edge = float(np.cbrt(6.0 * np.sqrt(2.0) * mesh.volumes.mean()))
-    pairs = cKDTree(points).query_pairs(_COINCIDENT * edge, output_type="ndarray")
+    edge = float(np.cbrt(6.0 * np.sqrt(2.0) * np.median(mesh.volumes)))
+    distance, found = cKDTree(points).query(points, k=2, distance_upper_bound=_COINCIDENT * edge)
+    near = np.flatnonzero(np.isfinite(distance[:, 1]))
+    # Of two nodes at one place either may be found first.
+    other = np.where(found[near, 1] == near, found[near, 0], found[near, 1])
+    pairs = np.unique(np.sort(np.column_stack([near, other]), axis=1), axis=0)
     if len(pairs):
         where = np.round(points[pairs[0, 0]], 2).tolist()
         yield (
