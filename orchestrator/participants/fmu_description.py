@@ -108,9 +108,9 @@ def read_description(file: FmuFile) -> Description:
             raise
         # FMPy raises plain Exceptions.
         except Exception as error:
-            raise InputError(
-                f"FMPy cannot read it as an FMU ({shortened(str(error) or type(error).__name__, 200)})"
-            ) from None
+            # Of numbers with too many digits Python names a remedy that is none here.
+            reason = str(error).partition("; use sys.")[0] or type(error).__name__
+            raise InputError(f"FMPy cannot read it as an FMU ({shortened(reason, 200)})") from None
         _check(variables)
     own = _own(root)
     unit = None if own is None else own.find("Unit")

@@ -27,13 +27,24 @@ _SCHEMAS = {
     "ssm": "SystemStructureParameterMapping.xsd",
 }
 
+#: The elements that say which version of the standard they follow.
+_VERSIONED = (
+    f"{{{_NAMESPACES['ssd']}}}SystemStructureDescription",
+    f"{{{_NAMESPACES['ssv']}}}ParameterSet",
+    f"{{{_NAMESPACES['ssm']}}}ParameterMapping",
+)
+
 #: Characters of a schema's complaint that are repeated; it quotes values of any length.
 _LONGEST_PROBLEM = 300
 
 
 def unpack(path: Path, folder: Path) -> Any:
     """Unpack the package at `path` into `folder`, and return the root of its system structure."""
-    if not path.exists():
+    try:
+        missing = not path.exists()
+    except OSError as error:
+        raise InputError(f"it cannot be read ({error.strerror})") from None
+    if missing:
         raise InputError("no such file")
     try:
         with open_archive(path) as archive:
@@ -65,9 +76,15 @@ def parsed(content: bytes, kind: str, name: str) -> Any:
 
 
 def check(element: Any, kind: str, name: str) -> None:
-    """InputError if `element` does not follow the schema of its `kind`."""
-    schema = _schema(kind)
-    if not schema.validate(etree.ElementTree(deepcopy(element))):
+    """InputError if `element` does not follow the schema of its `kind`.
+
+    A file of SSP 2.0 is read if it is one of SSP 1.0 but for its version; what is new in it is refused by its name.
+    """
+    schema, copied = _schema(kind), deepcopy(element)
+    for item in copied.iter(*_VERSIONED):
+        if item.get("version") == "2.0":
+            item.set("version", "1.0")
+    if not schema.validate(etree.ElementTree(copied)):
         problem = schema.error_log[0]
         message = shortened(problem.message, _LONGEST_PROBLEM)
         raise InputError(f"{name}, line {problem.line}: not as SSP 1.0 has it: {message}")

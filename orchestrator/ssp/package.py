@@ -28,6 +28,9 @@ _STEPS = 100
 #: What an annotation of this project says, and the kinds of it; units and connections are the standard's.
 _KEPT = {"coupling": dict, "run": dict, "output": dict, "every": dict, "scene": dict}
 
+#: Values that are told not to be used.
+_MOST_NOTES = 20
+
 #: Characters of what is wrong with it that are told.
 _LONGEST_REASON = 200
 
@@ -47,7 +50,12 @@ def open_package(
     with TemporaryDirectory(prefix="cosim-ssp-") as name:
         folder = Path(name)
         try:
-            content = _content(unpack(path, folder), folder, tell)
+            notes: list[str] = []
+            content = _content(unpack(path, folder), folder, notes.append)
+            for note in notes[:_MOST_NOTES]:
+                tell(note)
+            if len(notes) > _MOST_NOTES:
+                tell(f"and {len(notes) - _MOST_NOTES} more parameter values are not used")
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
         assigned = {text.partition("=")[0].strip() for text in assignments}

@@ -47,6 +47,9 @@ def conversion(source: Measure, target: Measure, relative: bool = False) -> Law 
     `relative` quantities, differences of temperature, have no offsets. InputError if the two measure different things,
     or are not defined.
     """
+    # Some tools write [m] for m where they do not define it.
+    if source.name.strip("[]") == target.name.strip("[]") and None in (source.exponents, target.exponents):
+        return None
     if source.name == target.name:
         return None
     for unit in (source, target):

@@ -112,7 +112,7 @@ class Wiring:
         """Source and sink of a connection in the system `node`, whichever of them it starts with."""
         ends: dict[bool, Pin] = {}
         for side in ("start", "end"):
-            label, name = element.get(f"{side}Element"), element.get(f"{side}Connector")
+            label, name = _element(element, side), element.get(f"{side}Connector")
             if label is not None and label not in node.parts:
                 raise InputError(
                     f"a connection names the component '{shortened(label)}'{did_you_mean(label, node.parts)}"
@@ -137,8 +137,13 @@ class Wiring:
         return ends[True], ends[False]
 
 
+def _element(element: Any, side: str) -> str | None:
+    """The name of what has the connector; None for the system itself, for which some tools write an empty name."""
+    return element.get(f"{side}Element") or None
+
+
 def _end(node: SystemNode, element: Any, side: str) -> Pin:
-    label = element.get(f"{side}Element")
+    label = _element(element, side)
     return Pin(node.path if label is None else (*node.path, label), element.get(f"{side}Connector"))
 
 

@@ -40,6 +40,10 @@ def parse_document(content: bytes) -> Any:
             parser.feed(content[begin : begin + _CHUNK])
         return parser.close()
     except etree.XMLSyntaxError as error:
+        if "Excessive depth" in str(error):
+            raise InputError(
+                f"it is nested more than 256 deep, in line {error.lineno}; no file of FMI or SSP is"
+            ) from None
         raise InputError(f"it is no well-formed XML ({shortened(str(error), _LONGEST)})") from None
     except MemoryError:
         raise InputError("it is too large for the memory; leave out what is not needed") from None

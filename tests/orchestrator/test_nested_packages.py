@@ -346,6 +346,44 @@ def test_components_may_be_descriptions_and_packages(tmp_path: Path) -> None:
             assert scenario.units["B_c"].start == {"u": 2.0}
 
 
+def test_what_other_tools_write_is_read(tmp_path: Path) -> None:
+    """A package could be refused for an empty name of the system, or for a version's number that changes nothing."""
+    whole = system("A", component("a") + component("b"), [".u -> a.u", "a.y -> b.u"], u="input")
+    assert 'startElement=""' not in whole
+    whole = whole.replace('startConnector="u" endElement="a"', 'startElement="" startConnector="u" endElement="a"')
+    assert 'startElement=""' in whole
+    path = package(tmp_path, whole)
+    newer = tmp_path / "newer.ssp"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(newer, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(
+                name, content.replace(b'version="1.0"', b'version="2.0"') if name.endswith(".ssd") else content
+            )
+    for each in (path, newer):
+        with opened(each) as scenario:
+            assert scenario.connections == ["a.y -> b.u"]
+
+
+def test_of_many_values_that_nobody_has_some_are_told(tmp_path: Path) -> None:
+    """The one line that matters could drown in a hundred thousand others."""
+    content = values(**{f"nobody{number}": ("Real", 1) for number in range(500)})
+    told: list[str] = []
+    with opened(package(tmp_path, system("A", component("a", bindings=bound(content)))), told):
+        assert len(told) == 21
+        assert told[-1] == "and 480 more parameter values are not used"
+
+
+def test_a_unit_of_measure_in_brackets_is_the_same(tmp_path: Path) -> None:
+    """A package whose values are in [m], as some tools write m, could be refused; [ell] is still not m."""
+    content = values(gain=("Real", 5)).replace('value="5"', 'value="5" unit="[m]"')
+    with opened(package(tmp_path, system("A", component("a", bindings=bound(content))))) as scenario:
+        assert scenario.units["a"].parameters == {"gain": 5.0}
+    other = package(tmp_path, system("A", component("a", bindings=bound(content.replace("[m]", "[ell]")))))
+    with pytest.raises(InputError, match=r"'\[ell\]' is not defined"), opened(other):
+        pass
+
+
 _TABLE = (
     '<ssm:MappingEntry source="g" target="gain"><ssc:IntegerMappingTransformation><ssc:MapEntry source="1" target="2"/>'
     "</ssc:IntegerMappingTransformation></ssm:MappingEntry>"

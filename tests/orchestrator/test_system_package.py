@@ -605,7 +605,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         ([], {"resources__damping_dot_ssv": _ssv(F=1)}, ["'F'", "takes a start value"]),
         ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: it is no well-formed XML"]),
         (
-            [('version="1.0" name="two masses"', 'version="2.0" name="two masses"')],
+            [('version="1.0" name="two masses"', 'version="3.0" name="two masses"')],
             {},
             ["SystemStructure.ssd, line 5", "version"],
         ),
@@ -648,6 +648,9 @@ def test_a_value_that_nobody_has_is_told(masses: Path, cosim: Cosim, tmp_path: P
 def test_files_that_are_no_packages(cosim: Cosim, tmp_path: Path) -> None:
     missing = cosim("run", tmp_path / "missing.ssp")
     assert (missing.code, missing.err) == (2, f"error: {tmp_path / 'missing.ssp'}: no such file\n")
+    long = cosim("run", tmp_path / f"{'x' * 300}.ssp")
+    assert long.code == 2
+    assert "cannot be read (File name too long)" in long.err
     (tmp_path / "text.ssp").write_text("this is no archive")
     text = cosim("show", tmp_path / "text.ssp")
     assert text.code == 2

@@ -131,6 +131,29 @@ def test_patch_is_found_by_the_equilibrium(cube, along) -> None:
     np.testing.assert_allclose(found.displacement, 0.0, atol=1e-11)
 
 
+def test_the_last_iterate_of_newtons_method_counts(cube, along, monkeypatch: pytest.MonkeyPatch) -> None:
+    # It could meet the limit and be called a failure: of n iterations n steps are taken, and n + 1 residuals looked at.
+    inner = np.setdiff1d(np.arange(cube.nodes), cube.surface)
+    solid = _solid(cube, along(cube, (0.6, 0.8, 0)), along(cube, (0, 0, 1)), np.unique(cube.surface))
+    tension, moved = np.full(cube.nodes, 0.3), np.zeros((cube.nodes, 3))
+    moved[inner] = [0.2, -0.1, 0.15]
+    steps: list[int] = []
+
+    def solve(iterations: int) -> None:
+        equilibrium = Equilibrium(solid, 1.0, Convergence(1e-10, newton_iterations=iterations))
+        search = equilibrium._search
+        monkeypatch.setattr(equilibrium, "_search", lambda *given: (steps.append(1), search(*given))[1])
+        # From the same tension there are no load steps that could help.
+        equilibrium.solve(moved, moved, tension, tension, Factored(moved, tension))
+
+    solve(25)
+    needed = len(steps)
+    assert needed > 2
+    solve(needed)
+    with pytest.raises(StepFailure, match=f"after {needed - 1} iterations"):
+        solve(needed - 1)
+
+
 def test_rigid_motion_costs_nothing(cube) -> None:
     solid = _solid(cube, *_frames(cube.elements))
     turn = Rotation.from_rotvec([0.5, -1.0, 2.0]).as_matrix()

@@ -680,3 +680,62 @@ def test_every_parameter_reaches_the_physics(scene: _Scene, variable: Any, alive
         return seen
 
     assert course(**changes) != course()
+
+
+# --- parameters far from their defaults ------------------------------------------------------------------------------
+
+
+class _Broken(FiberGenerator):
+    """A unit whose physics fails with a given exception."""
+
+    error: Exception = StepFailure("no equilibrium")
+
+    def initial(self, inputs: Any) -> dict[str, np.ndarray]:
+        raise self.error
+
+
+def _told(error: Exception, parameters: dict[str, float], mesh: Mesh) -> str:
+    unit = _Broken(mesh)
+    unit.error = error
+    unit.instantiate(parameters)
+    unit.setup_experiment()
+    unit.enter_initialization_mode()
+    with pytest.raises((InvalidInput, StepFailure)) as caught:
+        unit.exit_initialization_mode()
+    if not isinstance(error, (InvalidInput, StepFailure)):
+        assert isinstance(caught.value, StepFailure)
+    return str(caught.value)
+
+
+def test_what_fails_names_the_parameters_that_are_far_from_their_defaults(small_heart: Mesh) -> None:
+    # A person could look for the reason in the mesh, or in another parameter.
+    far = {"endocardial_angle_deg": 6e10, "epicardial_angle_deg": 59.0, "apex_z_mm": -71.0}
+    for error in (StepFailure("no equilibrium"), InvalidInput("no equilibrium")):
+        message = _told(error, far, small_heart)
+        assert message == (
+            "no equilibrium. Far from their defaults are: endocardial_angle_deg = 6e+10, epicardial_angle_deg = 59"
+        )
+        assert _told(error, {"apex_z_mm": -71.0}, small_heart) == "no equilibrium"
+
+
+def test_numbers_that_nothing_can_be_computed_with_are_a_failed_step(small_heart: Mesh) -> None:
+    # A parameter of 1e308 could end in a traceback; without one, a division by zero is a bug and has to look like it.
+    far = {"endocardial_angle_deg": 1e308}
+    for error in (np.linalg.LinAlgError("singular"), OverflowError("too large"), ZeroDivisionError(), MemoryError()):
+        message = _told(error, far, small_heart)
+        assert message.startswith("nothing can be computed any more (")
+        assert "endocardial_angle_deg = 1e+308" in message
+    with pytest.raises(ZeroDivisionError):
+        _told(ZeroDivisionError(), {}, small_heart)
+
+
+def test_outputs_that_are_not_finite_do_not_get_out(small_heart: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A state may be finite and what is shown of it not: infinity would go on to the next unit.
+    unit = FiberGenerator(small_heart)
+    unit.instantiate({})
+    unit.setup_experiment()
+    unit.enter_initialization_mode()
+    unit.exit_initialization_mode()
+    monkeypatch.setattr(unit, "output", lambda name, state: 1e300 * 1e300 * state[name])
+    with pytest.raises(StepFailure, match="'fiber' is not finite"):
+        unit.get("fiber")

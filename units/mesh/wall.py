@@ -132,7 +132,9 @@ def _check_union(faces: Mapping[str, IntArray], wall: Wall) -> None:
 
 def _septum_warnings(mesh: Mesh) -> list[str]:
     """The right cavity's volume does not depend on which of its sides is the septum, but the fibres do."""
-    left = cKDTree(mesh.points[mesh.boundary_nodes("lv_endocardium")])
+    # By nodes and by centres of faces: on a coarse mesh the nearest node is far from what it is near to.
+    faces = mesh.boundary("lv_endocardium")
+    left = cKDTree(np.vstack([mesh.points[np.unique(faces)], mesh.points[faces].mean(axis=1)]))
     septum, free = (
         left.query(mesh.points[mesh.boundary(name)].mean(axis=1))[0].mean() for name in ("rv_septum", "rv_endocardium")
     )
