@@ -59,8 +59,8 @@ class Convergence:
     """The history of the residuals of a loop's fields over the sweeps of one step.
 
     `criteria` are those given by name, `carried` the fields that a sweep starts from. Where no field of the loop has a
-    criterion, three digits are asked of those. `exact` are fields of which only equality has a meaning: their
-    residual is 1 where a value has changed, and has to vanish.
+    criterion, three digits are asked of those. `exact` are fields that are no real numbers: their residual is 1
+    where a value has changed, and has to vanish.
     """
 
     def __init__(

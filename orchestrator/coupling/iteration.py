@@ -114,8 +114,7 @@ class Iterated:
         # There are FMUs whose outputs do not follow their inputs before they leave initialization mode.
         values = {str(end): exchange.latest(end) for end in earlier}
         residuals = {
-            str(end): _residual(before, exchange.latest(end), end in exchange.discrete)
-            for end, before in earlier.items()
+            str(end): _residual(before, exchange.latest(end), self._is_real(end)) for end, before in earlier.items()
         }
         agree = settled.loops[-1].judge(residuals, values)
         return Sweeps(settled.loops, settled.converged and agree)
@@ -141,17 +140,17 @@ class Iterated:
         before: Sweeps,
     ) -> Sweeps:
         """Repeat `sweep` until what the `links` carry has converged; the history of it is added to those `before`."""
-        interface, discrete = _sources(links), exchange.discrete
-        exact = [str(end) for end in interface if end in discrete]
+        interface = _sources(links)
+        exact = [str(end) for end in interface if not self._is_real(end)]
         convergence = Convergence(self._limits.criteria, [str(end) for end in carried], exact)
-        # What changes at events is taken as it comes.
-        carried = [end for end in carried if end not in discrete]
+        # Truth values, whole numbers and texts are taken as they come.
+        carried = [end for end in carried if str(end) not in exact]
         self._acceleration.begin()
         for number in range(1, self._limits.max_iterations + 1):
             earlier = {end: exchange.latest(end) for end in interface}
             sweep(number)
             later = {end: exchange.latest(end) for end in interface}
-            residuals = {str(end): _residual(earlier[end], later[end], end in discrete) for end in interface}
+            residuals = {str(end): _residual(earlier[end], later[end], self._is_real(end)) for end in interface}
             values = {str(end): later[end] for end in interface}
             if convergence.judge(residuals, values):
                 return before.with_loop(convergence, True)
@@ -229,15 +228,18 @@ class Iterated:
             before.with_loop(convergence, False),
         )
 
+    def _is_real(self, end: End) -> bool:
+        return self._participants[end.unit].outputs[end.name].is_real
+
     def _place(self, name: str) -> str:
         unit, _, output = name.partition(".")
         location = self._participants[unit].outputs[output].location
         return location if location in ("node", "element") else "index"
 
 
-def _residual(before: Values, after: Values, discrete: bool) -> Values:
-    """H(x) − x; of values that change at events, 1 where they have changed."""
-    return np.asarray(before != after, dtype=float) if discrete else after - before
+def _residual(before: Values, after: Values, is_real: bool) -> Values:
+    """H(x) − x; of values that are no real numbers, 1 where they have changed."""
+    return after - before if is_real else np.asarray(before != after, dtype=float)
 
 
 def _sources(links: Iterable[Connection]) -> list[End]:

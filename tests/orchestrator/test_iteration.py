@@ -275,10 +275,10 @@ def _switched(fake: Any, port: Any, closes: Callable[[float], bool]) -> dict[str
     """y = 0.6 + 0.3 on, and `on` by what a relay `closes` at."""
 
     def level(given: Any, *_: Any) -> dict[str, Any]:
-        return {"y": 0.6 + 0.3 * given["on"]}
+        return {"y": 0.6 + 0.3 * float(given["on"])}
 
     def relay(given: Any, *_: Any) -> dict[str, Any]:
-        return {"on": float(closes(float(given["y"])))}
+        return {"on": closes(float(given["y"]))}
 
     on = port("on", type="Boolean", discrete=True)
     return {
