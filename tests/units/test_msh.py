@@ -116,6 +116,22 @@ def test_one_name_for_a_surface_and_a_volume(written: Callable[..., Path], small
     assert _described(read_mesh(written(4.1, False, do=name))) == _described(small_heart)
 
 
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_without_groups_the_entities_numbers_name_the_boundaries(
+    version: float, written: Callable[..., Path], small_heart: Mesh
+) -> None:
+    def forget() -> None:
+        gmsh.model.removePhysicalGroups()
+        for name in (*small_heart.boundaries, "myocardium"):
+            gmsh.model.removePhysicalName(name)
+
+    path = written(version, False, do=forget)
+    with pytest.raises(InvalidInput, match=r"no named boundaries.*'geometrical entity': 1, 2, 3, 4, 5"):
+        read_mesh(path)
+    naming = {name: [number] for number, name in enumerate(small_heart.boundaries, start=1)}
+    assert _described(read_mesh(path, naming)) == _described(small_heart)
+
+
 def test_tetrahedra_outside_of_all_groups_are_told(written: Callable[..., Path]) -> None:
     def regroup() -> None:
         _, tags, nodes = gmsh.model.mesh.getElements(3)

@@ -187,11 +187,13 @@ class _Blocks:
         self.others: dict[str, int] = {}
         #: Which triangles are in the physical group of each number.
         self.groups: dict[int, list[IntArray]] = {}
+        #: Which triangles lie on the geometrical entity of each number.
+        self.entities: dict[int, list[IntArray]] = {}
         self.triangles = 0
         self.grouped_tetrahedra = 0
 
-    def add(self, kind: int, nodes: IntArray, groups: dict[int, IntArray]) -> None:
-        """Elements of one kind, and which of them are in which groups."""
+    def add(self, kind: int, nodes: IntArray, groups: dict[int, IntArray], entities: dict[int, IntArray]) -> None:
+        """Elements of one kind, and which of them are in which groups and on which entities."""
         name, _, dimension = _KINDS[kind]
         if name not in READ:
             if dimension >= 2 and len(nodes):
@@ -199,8 +201,9 @@ class _Blocks:
         elif name in self.nodes:
             self.nodes[name].append(nodes)
         if name == "triangle":
-            for number, members in groups.items():
-                self.groups.setdefault(number, []).append(self.triangles + members)
+            for kept, found in ((self.groups, groups), (self.entities, entities)):
+                for number, members in found.items():
+                    kept.setdefault(number, []).append(self.triangles + members)
             self.triangles += len(nodes)
         elif name == "tetra" and groups:
             self.grouped_tetrahedra += len(np.unique(np.concatenate(list(groups.values()))))
@@ -259,7 +262,8 @@ class _Version2:
     def _add(rows: IntArray, kind: int, tags: int, blocks: _Blocks) -> None:
         groups = by_number(np.abs(rows[:, 1])) if tags else {}
         groups.pop(0, None)
-        blocks.add(kind, rows[:, 1 + tags :], groups)
+        entities = by_number(rows[:, 2]) if tags > 1 else {}
+        blocks.add(kind, rows[:, 1 + tags :], groups, entities)
 
 
 class _Version4:
@@ -312,7 +316,8 @@ class _Version4:
             count = numbers.one(self._size)
             rows, _ = numbers.rows(count, 1 + _nodes_of(kind), 0, self._size if self._minor else 4)
             groups = self._groups.get((dimension, entity), [])
-            blocks.add(kind, rows[:, 1:], {number: np.arange(count) for number in groups})
+            every = np.arange(count)
+            blocks.add(kind, rows[:, 1:], dict.fromkeys(groups, every), {entity: every})
 
 
 class _File:
@@ -364,6 +369,7 @@ class _File:
         triangles = np.concatenate([np.empty((0, 3), dtype=np.int64), *blocks.nodes["triangle"]])
         tetrahedra = np.concatenate([np.empty((0, 4), dtype=np.int64), *blocks.nodes["tetra"]])
         groups = {number: np.concatenate(members) for number, members in blocks.groups.items()}
+        entities = {number: np.concatenate(members) for number, members in blocks.entities.items()}
         named: dict[str, Any] = {}
         for (dimension, number), name in self._names.items():
             if dimension == 2:
@@ -382,7 +388,8 @@ class _File:
             _places(tags, triangles),
             blocks.others,
             named,
-            {"physical group": groups} if groups else {},
+            # Without physical groups gmsh saves everything, and the entities' numbers are all there is.
+            {"physical group": groups} if groups else {"geometrical entity": entities} if entities else {},
             tuple(notes),
         )
 

@@ -43,6 +43,10 @@ _BOTH_VENTRICLES = Wall(
     ("epicardium", "rv_septum"),
     {"lv_volume": ("lv_endocardium",), "rv_volume": ("rv_endocardium", "rv_septum")},
 )
+#: How much farther than the free wall, to the nearest node of the left cavity, what is no septum lies: a septum is at
+#: two thirds of it, and on the coarsest meshes a few per cent say nothing.
+_FARTHER = 1.25
+
 _RIGHT = {"rv_endocardium", "rv_septum"}
 
 
@@ -138,7 +142,7 @@ def _septum_warnings(mesh: Mesh) -> list[str]:
     septum, free = (
         left.query(mesh.points[mesh.boundary(name)].mean(axis=1))[0].mean() for name in ("rv_septum", "rv_endocardium")
     )
-    if septum <= free:
+    if septum <= _FARTHER * free:
         return []
     return [
         f"'rv_septum' lies farther from the left cavity than 'rv_endocardium' ({septum:.3g} and {free:.3g} mm on "
