@@ -4,12 +4,15 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..participants.participant import Participant, Port, Ports, Ramp, Values
+from ..quoting import shortened
 from ..scenario import ConnectionEntry
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -18,6 +21,9 @@ _UNIT = re.compile(r"^\w+\.")
 
 #: Names that are read as they are written in 'unit.output * 2 -> unit.input'; any other is told as an entry.
 _PLAIN = re.compile(r"^(?!.*(?:->|\s[*+-]\s))\S(?:[^\x00-\x1f\x7f]*\S)?$")
+
+#: Arrows in one text that may be the one that is meant, and characters of it that a message repeats.
+_MOST_ARROWS, _LONGEST = 20, 200
 
 #: Types whose values can become those of another type, beside those that are the same.
 _WHOLE = {"Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))}
@@ -132,7 +138,7 @@ def _whole(target: End, participants: Mapping[str, Participant]) -> End:
 def _parse(text: str, participants: Mapping[str, Participant]) -> Connection:
     """The one way to read `text` by which both its ends exist."""
     found: list[Connection] = []
-    for arrow in re.finditer("->", text):
+    for arrow in islice(re.finditer("->", text), _MOST_ARROWS):
         sources = list(_sources(text[: arrow.start()].strip(), participants))
         target = _end(text[arrow.end() :].strip())
         if target is not None and _exists(target, participants, "input"):
@@ -141,7 +147,8 @@ def _parse(text: str, participants: Mapping[str, Participant]) -> Connection:
         return found[0]
     if found:
         ways = " or ".join(json.dumps(way.entry(), ensure_ascii=False) for way in found)
-        raise InputError(f"connections: '{text}' can be read in several ways; write it as an entry, {ways}")
+        shown = shortened(text, _LONGEST)
+        raise InputError(f"connections: '{shown}' can be read in several ways; write it as an entry, {ways}")
     raise InputError(f"connections: {_unreadable(text, participants)}")
 
 
@@ -160,6 +167,8 @@ def _split(text: str) -> tuple[str, Law | None]:
     if match is None or not match[0]:
         return text, None
     factor, offset = float(match["factor"] or 1.0), float(match["offset"] or 0.0)
+    if not (isfinite(factor) and isfinite(offset)):
+        raise InputError(f"connections: '{shortened(text)}': the numbers of a law have to be finite")
     return text[: match.start()].rstrip(), Law(factor, -offset if match["sign"] == "-" else offset)
 
 
@@ -184,11 +193,11 @@ def _unreadable(text: str, participants: Mapping[str, Participant]) -> str:
     wild = source is None or target is None or "->" in after or re.search(r"\s[*+-](\s|$)", source.name)
     if not arrow or source is None or target is None or (wild and _missing(source, participants, "output")):
         return (
-            f"'{text}' cannot be read; write it as 'unit.output -> unit.input', "
+            f"'{shortened(text, _LONGEST)}' cannot be read; write it as 'unit.output -> unit.input', "
             "or with a law, 'unit.output * 0.001 + 273 -> unit.input'"
         )
     problem = _missing(source, participants, "output") or _missing(target, participants, "input")
-    return f"'{text}': {problem}"
+    return f"'{shortened(text, _LONGEST)}': {problem}"
 
 
 def _missing(end: End, participants: Mapping[str, Participant], side: str) -> str | None:

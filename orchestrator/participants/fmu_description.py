@@ -36,6 +36,9 @@ _TRUE = ("true", "1")
 #: Value references are 32 bits wide.
 _REFERENCES = 2**32
 
+#: Dimensions of an array; NumPy's own limit is 32 in its older versions.
+MOST_DIMENSIONS = 16
+
 #: Elements of an array, 160 MB of numbers; more is a slip of the pen, or meant to fill the memory.
 _MOST_ELEMENTS = 20_000_000
 
@@ -92,6 +95,7 @@ def read_description(file: FmuFile) -> Description:
         try:
             head = fmpy.read_model_description(_archive(_head(root) if version == "2.0" else root), validate=False)
             types = {kind.name: kind for kind in head.typeDefinitions}
+            _check_items(types)
             if version == "2.0":
                 variables = [_variable(element, types) for element in root.iterfind("ModelVariables/ScalarVariable")]
             else:
@@ -121,6 +125,18 @@ def read_description(file: FmuFile) -> Description:
         _NO_FIELDS if own is None else {field.get("name"): dict(field.attrib) for field in own.iter("Field")},
         unit is not None and unit.get("memoryless") == "true",
     )
+
+
+def _check_items(types: Mapping[str, Any]) -> None:
+    """InputError for an enumeration whose items have no numbers."""
+    for name, kind in types.items():
+        for item in kind.items:
+            try:
+                int(item.value)
+            except (TypeError, ValueError):
+                raise InputError(
+                    f"the item '{shortened(str(item.name))}' of its type '{shortened(str(name))}' has no whole number"
+                ) from None
 
 
 def _version(root: Any) -> str:
@@ -229,7 +245,8 @@ def _check(variables: Sequence[Variable]) -> None:
         wrong = next(variable for variable in variables if not 0 <= variable.valueReference < _REFERENCES)
         raise InputError(f"its variable '{shortened(wrong.name)}' has no valid value reference: {wrong.valueReference}")
     for variable in variables:
-        if variable.shape and (min(variable.shape) < 0 or prod(variable.shape) > _MOST_ELEMENTS):
+        shape = variable.shape
+        if shape and (len(shape) > MOST_DIMENSIONS or min(shape) < 0 or prod(shape) > _MOST_ELEMENTS):
             raise InputError(
                 f"its variable '{shortened(variable.name)}' has the shape {quoted(variable.shape)}; dimensions are "
                 f"counts, and more than {_MOST_ELEMENTS} elements are refused"

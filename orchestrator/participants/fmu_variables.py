@@ -28,7 +28,7 @@ from fmpy.fmi2 import fmi2ValueReference
 from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError, did_you_mean
 from ..quoting import quoted, shortened
-from .fmu_description import Description, Variable
+from .fmu_description import MOST_DIMENSIONS, Description, Variable
 from .participant import INDEXED, Parameters, Port, Ports, Values
 
 #: How FMI calls an initial value that the caller may give.
@@ -241,7 +241,8 @@ def _grouped(variables: Sequence[Variable]) -> Iterator[_Group]:
 def _filled(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...] | None:
     """The shape of the array that sorted `indices` fill, each from 1 or each from 0; None if they fill none."""
     first, last = indices[0], indices[-1]
-    if len(first) != len(last) or first not in ((0,) * len(first), (1,) * len(first)) or not first:
+    count = len(first)
+    if not 0 < count <= MOST_DIMENSIONS or count != len(last) or first not in ((0,) * count, (1,) * count):
         return None
     shape = tuple(end - first[0] + 1 for end in last)
     # Counted first: a wild index is not to make a list of its size.

@@ -16,7 +16,7 @@ from ...units.mesh.file import read_mesh
 from ...units.mesh.frame import check_frame, frame_warnings
 from ...units.mesh.places import Places
 from ...units.mesh.quality import signed_inverse_condition_number
-from ...units.mesh.wall import repeated_boundary
+from ...units.mesh.wall import wall_warnings
 from ...units.registry import UNITS
 from ...units.snapshot import Snapshot
 from ...units.statistics import Statistic
@@ -70,9 +70,7 @@ def check_mesh(mesh: Mesh, scene: Scene, folder: Path, units: Collection[str]) -
 
 def mesh_warnings(mesh: Mesh, scene: Scene) -> list[str]:
     """What was changed to read the mesh, and what is unusual of it."""
-    repeated = repeated_boundary(mesh)
-    unused = [] if repeated is None else [f"the boundary '{repeated}' repeats faces of others and is not used"]
-    return [*mesh.notes, *unused, *frame_warnings(mesh, scene.scale is not None)]
+    return [*mesh.notes, *wall_warnings(mesh), *frame_warnings(mesh, scene.scale is not None)]
 
 
 def unit_warnings(unit: str, parameters: Parameters, mesh: Mesh) -> list[str]:
@@ -183,7 +181,9 @@ class NativeParticipant:
         if ramps and any(variable.name == INPUT_INTERPOLATION for variable in UNITS[unit].variables()):
             parameters = {INPUT_INTERPOLATION: "linear"} | parameters
         self.inputs, self.outputs = unit_ports(unit, mesh, parameters)
-        known = Ports(self.outputs | self.inputs | _parameter_ports(unit))
+        every = self.outputs | self.inputs | _parameter_ports(unit)
+        # In the order of declaration, as in the unit's FMU.
+        known = Ports({variable.name: every[variable.name] for variable in UNITS[unit].variables()})
         self.observed = known.chosen(observe, f"unit '{name}'")
         self._known = known
         self._unit: Unit = UNITS[unit](mesh)

@@ -71,8 +71,9 @@ class Port:
 
     @property
     def column(self) -> str:
-        """The port's name with its unit of measure: `potential_mV`."""
-        return self.name if self.unit in (None, "1") else f"{self.name}_{str(self.unit).replace('/', '_per_')}"
+        """The port's name with its unit of measure, if it does not end in that already: `potential_mV`."""
+        suffix = "" if self.unit in (None, "1") else f"_{str(self.unit).replace('/', '_per_')}"
+        return self.name if self.name.endswith(suffix) else f"{self.name}{suffix}"
 
 
 class Ports(dict[str, Port]):

@@ -34,15 +34,17 @@ class AppendedFile:
             self._file.seek(self._size)
 
     def append(self, content: bytes) -> None:
-        """Add `content` and hand it to the operating system; if that refuses, the file is as before."""
+        """Add `content` and hand it to the operating system; where that is refused, the file is as before."""
         rest = content
         try:
             while rest:
                 rest = rest[self._file.write(rest) :]
-        except OSError as error:
+        except BaseException as error:
             os.ftruncate(self._file.fileno(), self._size)
             self._file.seek(self._size)
-            raise OSError(error.errno, error.strerror, str(self._path)) from None
+            if isinstance(error, OSError):
+                raise OSError(error.errno, error.strerror, str(self._path)) from None
+            raise
         self._digest.update(content)
         self._size += len(content)
 

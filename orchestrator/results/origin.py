@@ -60,7 +60,9 @@ class Origin:
         try:
             prints = content["fingerprints"]
             parts = (content["scenario"], prints["files"], content["versions"])
-            if not all(isinstance(part, dict) for part in parts):
+            if not all(isinstance(part, dict) for part in parts) or not all(
+                isinstance(value, str) for value in content["versions"].values()
+            ):
                 raise ValueError("no fingerprints")
             return cls(parts[0], parts[1], str(prints["program"]), parts[2])
         except (KeyError, TypeError):

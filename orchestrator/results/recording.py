@@ -185,6 +185,9 @@ class Recording:
 
     def _ending(self, error: BaseException | None, problems: list[Exception]) -> BaseException | None:
         """What a run ends with that ended with `error` and whose files then had these problems."""
+        if isinstance(error, SystemExit):
+            # Whatever code it chose: the process is not to end as if the run were done.
+            error = RunError(f"something that the run called ended the process (exit code {error.code})")
         bugs = [problem for problem in problems if not isinstance(problem, OSError)]
         # Where the operating system has refused once, nobody need be told of every file again.
         if not problems or (error is self._refusal is not None and not bugs):

@@ -1,7 +1,7 @@
 """summary.json: the run in a few numbers, and the scenario it came from."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -76,9 +76,18 @@ def write_summary(
 
 
 def is_summary(content: Mapping[str, Any]) -> bool:
-    """Whether `content` has what the summary of a run that is done has."""
-    return all(isinstance(content.get(key), kind) for key, kind in _KINDS.items()) and isinstance(
-        content["wall_s"].get("total"), (int, float)
+    """Whether `content` has what whoever reads the summary of a run that is done relies on."""
+
+    def numbers(values: Iterable[Any]) -> bool:
+        return all(isinstance(value, (int, float)) for value in values)
+
+    if not all(isinstance(content.get(key), kind) for key, kind in _KINDS.items()):
+        return False
+    volumes = [content.get(f"{chamber}_volume_ml") for chamber in content["ejection_fraction"]]
+    return (
+        numbers([content["wall_s"].get("total"), *content["unconverged_ms"], *content["ejection_fraction"].values()])
+        and numbers(value for value in content["activation_time_ms"].values() if value is not None)
+        and all(isinstance(volume, dict) and numbers([volume.get("start"), volume.get("min")]) for volume in volumes)
     )
 
 

@@ -36,6 +36,7 @@ class TimeSeries:
         resumed: Mapping[str, Any] | None = None,
     ) -> None:
         self._probes = probes
+        self._chosen = any(participant.observed for participant in participants.values())
         self._recorded = recorded(participants)
         self.columns = ["time_ms"]
         self.texts: set[str] = set()
@@ -82,12 +83,16 @@ class TimeSeries:
     def _columns(self, port: Port) -> list[str]:
         """The columns of a port, each with its unit of measure."""
         names = port.elements
-        if port.record == "probes":
+        if self._is_probed(port):
             names = iter([f"{port.name}_{probe}" for probe in self._probes.names] if self._probes else [])
         return [f"{name}{port.column.removeprefix(port.name)}" for name in names]
 
+    def _is_probed(self, port: Port) -> bool:
+        """Whether a field is recorded at the probes; one that was asked for, where there are none, is as a whole."""
+        return port.record == "probes" and (not self._chosen or bool(self._probes and self._probes.names))
+
     def _cells(self, port: Port, values: Values) -> list[Cell]:
-        if port.record == "probes":
+        if self._is_probed(port):
             return [*self._probes(values)] if self._probes else []
         cells: list[Cell] = (values.astype(int) if port.type == "Boolean" else values).ravel().tolist()
         return cells

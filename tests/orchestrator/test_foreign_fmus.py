@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -57,7 +58,7 @@ def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "holding": _builder.build_body(folder / "holding.fmu", ramps=False),
     } | {
         quirk.lower(): _builder.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
-        for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES")
+        for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES", "LEAVES", "BREAKS")
     }
 
 
@@ -233,3 +234,46 @@ def test_an_fmu_that_is_beyond_repair_is_lost(first: Any) -> None:
     body = first("dies")
     with pytest.raises(ParticipantLost, match="beyond repair"):
         body.start(0.05, 0.01)
+
+
+def test_an_fmu_that_takes_no_second_derivatives_gets_the_first_and_says_so_once(
+    simulate: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    settings = ("coupling.interpolation=linear", "coupling.extrapolation=2")
+    capfd.readouterr()
+    lines, _ = simulate(*settings, kinds=("lines", "lines"))
+    notes = [line for line in capfd.readouterr().err.splitlines() if line.startswith("note: ")]
+    assert [note.partition(";")[0] for note in notes] == [
+        f"note: unit '{unit}' takes derivatives of its inputs up to order 1" for unit in ("first", "second")
+    ]
+    # Straight lines, to ends that are known to second order.
+    assert np.abs(_states(lines) - _MASSES.exact(2.0)).max() < 5e-3
+
+
+# --- FMUs that end the process ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("quirk", "code", "how"), [("leaves", 3, "exit(0)"), ("breaks", 139, "SIGSEGV")])
+def test_a_run_that_an_fmu_ends_does_not_pass_for_done(
+    quirk: str, code: int, how: str, bodies: dict[str, Path], tmp_path: Path
+) -> None:
+    text = _SCENARIO.replace("FIRST", str(bodies[quirk])).replace("SECOND", str(bodies["whole"]))
+    (tmp_path / "oscillator.yaml").write_text(text)
+    command = [sys.executable, "-m", "cardiac_cosim.orchestrator.cli", "run", str(tmp_path / "oscillator.yaml")]
+    ended = subprocess.run(
+        [*command, "--output", str(tmp_path / "out"), "--no-figures"], capture_output=True, text=True, timeout=60
+    )
+    assert ended.returncode == code
+    assert ended.stderr.count("\n") == 1
+    assert f"{how} in unit 'first' at 50 ms" in ended.stderr.replace("call of ", "")
+    # What was done until then is there, and does not say that it is all.
+    series = np.genfromtxt(tmp_path / "out" / "timeseries.csv", delimiter=",", names=True)
+    assert series["time_ms"][-1] == 50.0
+    assert not (tmp_path / "out" / "summary.json").exists()
+
+
+@pytest.mark.parametrize("every", [3, 7])
+def test_a_unit_of_equal_steps_is_not_stepped_less_often_where_that_does_not_divide(every: int, simulate: Any) -> None:
+    with pytest.raises(InputError, match=r"units\.second\.every: it takes equal steps only"):
+        simulate(f"units.second.every={every}", kinds=("whole", "equal"))
+    simulate("units.second.every=4", "run.stop_ms=80", "output.every_ms=40", kinds=("whole", "equal"))

@@ -4,6 +4,7 @@ import csv
 import importlib.util
 import json
 import re
+import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
@@ -269,11 +270,41 @@ def test_a_run_with_texts_goes_on_from_a_checkpoint(
         ([("x", "Real", "output", 2**32 + 16)], "'x' has no valid value reference: 4294967312"),
         ([("x", "Real", "output", 16, "", 'declaredType="Nothing"')], "'x' is of the type 'Nothing', which it lacks"),
         ([("x", "Colour", "output", 16)], "variable 'x' has no type"),
+        ([("", "Real", "output", 16)], "one of its variables has no name"),
     ],
 )
 def test_descriptions_that_contradict_themselves_are_refused(simulate: Simulate, variables: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         simulate(variables)
+
+
+def test_an_enumeration_without_numbers_is_refused(simulate: Simulate) -> None:
+    with pytest.raises(InputError, match="the item 'off' of its type 'Mode' has no whole number"):
+        simulate(_ALL, head=_TYPES.replace("value='1'", "value='one'"))
+
+
+def test_a_library_that_needs_another_one_is_told_apart_from_a_damaged_one(simulate: Simulate, tmp_path: Path) -> None:
+    simulate(_ALL)
+    (tmp_path / "other.c").write_text("int other(void) { return 1; }")
+    (tmp_path / "box.c").write_text("int other(void); int fmi2DoStep(void) { return other(); }")
+    for command in (["other.c", "-o", "libother.so"], ["box.c", "-L.", "-lother", "-o", "box.so"]):
+        subprocess.run(["cc", "-shared", "-fPIC", *command], cwd=tmp_path, check=True)
+    with zipfile.ZipFile(tmp_path / "a.fmu") as archive:
+        (library,) = [name for name in archive.namelist() if "binaries" in name]
+        text = archive.read("modelDescription.xml")
+
+    def packed(content: bytes) -> None:
+        with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
+            archive.writestr(library, content)
+            archive.writestr("modelDescription.xml", text)
+
+    scenario = load_scenario(tmp_path / "s.yaml")
+    packed((tmp_path / "box.so").read_bytes())
+    with pytest.raises(InputError, match=r"because it needs another one: libother\.so"):
+        run_scenario(scenario, tmp_path, tmp_path / "out")
+    packed((tmp_path / "libother.so").read_bytes())
+    with pytest.raises(InputError, match=r"its library is incomplete: .*undefined symbol: fmi2"):
+        run_scenario(scenario, tmp_path, tmp_path / "out")
 
 
 def test_a_second_instance_of_an_fmu_that_allows_one_needs_a_process_of_its_own(tmp_path: Path) -> None:
@@ -399,3 +430,18 @@ def test_a_number_that_a_type_cannot_hold_ends_the_run(tmp_path: Path) -> None:
 def test_a_step_that_ends_early_without_being_allowed_to_is_no_step(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"returned from its step early, at 2\.5 s"):
         _run3(tmp_path, [], early=True)
+
+
+def test_variables_of_our_own_units_are_chosen_alike_directly_and_through_fmus(tmp_path: Path, fmu_dir: Path) -> None:
+    (tmp_path / "s.yaml").write_text(
+        "name: cell\nscene: {geometry: cell}\nunits: {tension: {unit: active_stress}}\nrun: {stop_ms: 3}\n"
+        "output: {every_ms: 3, variables: ['tension.*']}\n"
+    )
+    texts = []
+    for kind in ("native", "fmu"):
+        scenario = load_scenario(tmp_path / "s.yaml", [f"run.participants={kind}"])
+        run_scenario(scenario, tmp_path, tmp_path / kind, fmu_dir=fmu_dir)
+        texts.append((tmp_path / kind / "timeseries.csv").read_text())
+    assert texts[0] == texts[1]
+    # Parameters, texts among them, inputs and outputs, with their units of measure once.
+    assert {"delay_function", "potential[1]_mV", "active_stress[1]_kPa"} <= set(texts[0].splitlines()[0].split(","))

@@ -9,7 +9,7 @@ from cardiac_cosim.units.fiber_generator import FiberGenerator
 from cardiac_cosim.units.geometry import registry
 from cardiac_cosim.units.mechanics import Mechanics
 from cardiac_cosim.units.mesh import Mesh
-from cardiac_cosim.units.mesh.wall import repeated_boundary, wall_of
+from cardiac_cosim.units.mesh.wall import wall_of, wall_warnings
 
 Boundaries = dict[str, np.ndarray]
 
@@ -41,8 +41,7 @@ def test_the_anatomy_follows_from_the_names(small_heart: Mesh) -> None:
 def test_a_group_beside_the_boundaries_changes_nothing(small_heart: Mesh, started) -> None:
     both = np.vstack([small_heart.boundary("lv_endocardium"), small_heart.boundary("rv_endocardium")])
     more = _with(small_heart, lambda have: have | {"surface": small_heart.surface, "endocardium": both})
-    assert repeated_boundary(more) == "endocardium"
-    assert repeated_boundary(small_heart) is None
+    assert wall_warnings(more) == ["the boundary 'endocardium' repeats faces of others and is not used"]
     assert wall_of(more) == wall_of(small_heart)
     fibers = [started(FiberGenerator, mesh).get("fiber") for mesh in (small_heart, more)]
     np.testing.assert_array_equal(*fibers)
@@ -106,9 +105,12 @@ def test_exchanged_names_are_refused(small_heart: Mesh) -> None:
     chambers = _renamed(small_heart, lv_endocardium="rv_endocardium", rv_endocardium="lv_endocardium")
     with pytest.raises(InvalidInput, match="rim off the base"):
         wall_of(chambers)
-    sides = _renamed(small_heart, rv_septum="rv_endocardium", rv_endocardium="rv_septum")
-    with pytest.raises(InvalidInput, match="'rv_septum' lies farther from the left cavity than 'rv_endocardium'"):
-        wall_of(sides)
+
+
+def test_a_septum_that_lies_outside_is_told(small_heart: Mesh) -> None:
+    assert wall_warnings(small_heart) == []
+    (warning,) = wall_warnings(_renamed(small_heart, rv_septum="rv_endocardium", rv_endocardium="rv_septum"))
+    assert warning.startswith("'rv_septum' lies farther from the left cavity than 'rv_endocardium'")
 
 
 def test_a_hole_in_a_cavitys_wall_is_refused_without_mechanics_too(small_heart: Mesh) -> None:

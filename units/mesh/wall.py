@@ -53,7 +53,7 @@ def wall_of(mesh: Mesh) -> Wall:
     ------
     InvalidInput
         Where its boundaries are no partition of the surface: a face in two of them, or, unless it is a piece of wall,
-        in none; where an `endocardium` hides a cavity, a cavity is none, or the septum is not between the two.
+        in none; where an `endocardium` hides a cavity, or a cavity is none.
     """
     have = set(mesh.boundaries)
     if _RIGHT & have:
@@ -74,15 +74,18 @@ def wall_of(mesh: Mesh) -> Wall:
         _check_complete(mesh, faces, wall, names)
         for surfaces in wall.cavities.values():
             checked_rim(mesh, surfaces)
-        if wall is _BOTH_VENTRICLES:
-            _check_septum(mesh)
     return wall
 
 
-def repeated_boundary(mesh: Mesh) -> str | None:
-    """The name of a boundary that repeats faces of a cavity's and is not used for that: a union beside its parts."""
-    closed = {"lv_endocardium", *_RIGHT} & set(mesh.boundaries)
-    return "endocardium" if closed and "endocardium" in mesh.boundaries else None
+def wall_warnings(mesh: Mesh) -> list[str]:
+    """What is unusual of the boundaries of a mesh that has an anatomy, and may be meant."""
+    warnings = []
+    have = set(mesh.boundaries)
+    if "endocardium" in have and {"lv_endocardium", *_RIGHT} & have:
+        warnings.append("the boundary 'endocardium' repeats faces of others and is not used")
+    if {"lv_endocardium", *_RIGHT} <= have:
+        warnings += _septum_warnings(mesh)
+    return warnings
 
 
 def _numbered(mesh: Mesh) -> dict[str, IntArray]:
@@ -127,7 +130,7 @@ def _check_union(faces: Mapping[str, IntArray], wall: Wall) -> None:
         )
 
 
-def _check_septum(mesh: Mesh) -> None:
+def _septum_warnings(mesh: Mesh) -> list[str]:
     """The right cavity's volume does not depend on which of its sides is the septum, but the fibres do."""
     # By nodes and by centres of faces: on a coarse mesh the nearest node is far from what it is near to.
     faces = mesh.boundary("lv_endocardium")
@@ -135,11 +138,12 @@ def _check_septum(mesh: Mesh) -> None:
     septum, free = (
         left.query(mesh.points[mesh.boundary(name)].mean(axis=1))[0].mean() for name in ("rv_septum", "rv_endocardium")
     )
-    if septum > free:
-        raise InvalidInput(
-            f"'rv_septum' lies farther from the left cavity than 'rv_endocardium' ({septum:.3g} and {free:.3g} mm on "
-            "average); exchange their names"
-        )
+    if septum <= free:
+        return []
+    return [
+        f"'rv_septum' lies farther from the left cavity than 'rv_endocardium' ({septum:.3g} and {free:.3g} mm on "
+        "average): the fibres are wrong if these names are exchanged"
+    ]
 
 
 def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names: tuple[str, ...]) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ..whole import replacing
 from .fiber_layout import fiber_layout
 from .heart_potential import heart_potential
 from .lines import cavity_volumes, probe_potential
@@ -38,6 +39,7 @@ def draw_figures(folder: Path) -> list[Path]:
             continue
         path.parent.mkdir(exist_ok=True)
         FigureCanvasAgg(figure)
-        figure.savefig(path, dpi=_DOTS_PER_INCH)
+        with replacing(path) as part:
+            figure.savefig(part, format="png", dpi=_DOTS_PER_INCH)
         drawn.append(path)
     return drawn

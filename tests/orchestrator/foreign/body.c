@@ -11,6 +11,8 @@
 #define DIES 4      /* fmi2Fatal from 50 ms on */
 #define REASONS 5   /* discards a step from 50 ms on and says why, as a message of that status */
 #define LINES 6     /* takes first derivatives of inputs only */
+#define LEAVES 7    /* ends the process from 50 ms on as if all were done: exit(0) */
+#define BREAKS 8    /* writes where nobody may from 50 ms on */
 #ifndef QUIRK
 #define QUIRK 0
 #endif
@@ -152,6 +154,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no
     }
     ((Body *)c)->reached = time;
     if (time > 0.0499) {
+        if (QUIRK == LEAVES) exit(0);
+        if (QUIRK == BREAKS) *(volatile int *)8 = 0;
         if (QUIRK == ENDS) return fmi2Discard;
         if (QUIRK == DIES) { fail(c, "beyond repair"); return fmi2Fatal; }
         if (QUIRK == REASONS) {
