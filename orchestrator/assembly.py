@@ -60,9 +60,18 @@ def assemble(
     recorded(participants)
     scheme, converged = build_scheme(scenario.coupling, participants, connections)
     master = build_master(scenario, participants, connections, scheme)
-    return Assembly(
-        scenario, mesh, probes, participants, connections, converged, master, scene_warnings(scenario, mesh)
-    )
+    return Assembly(scenario, mesh, probes, participants, connections, converged, master, _warnings(scenario, mesh))
+
+
+def _warnings(scenario: Scenario, mesh: Mesh | None) -> list[str]:
+    warnings = scene_warnings(scenario, mesh)
+    adaptive = scenario.coupling.adaptive
+    if scenario.inputs is not None and adaptive is not None:
+        warnings.append(
+            f"coupling.adaptive does not judge what the signals of {scenario.inputs.file} do inside of a step; keep "
+            f"`max_ms` ({adaptive.max_ms:g} ms) well below the times in which they change"
+        )
+    return warnings
 
 
 def called_directly(scenario: Scenario) -> Scenario:

@@ -79,9 +79,12 @@ class Workers:
                 nanny.auto_restart = False
                 with suppress(ProcessLookupError, TypeError):
                     os.kill(nanny.pid, signal.SIGKILL)
-        self._client.close(timeout=_CLOSING_S)
+        # What Dask has not put away on a busy machine by then goes with this process; the run is over all the same.
+        with suppress(TimeoutError):
+            self._client.close(timeout=_CLOSING_S)
         if self._cluster is not None:
-            self._cluster.close(timeout=_CLOSING_S)
+            with suppress(TimeoutError):
+                self._cluster.close(timeout=_CLOSING_S)
 
 
 class _Host:

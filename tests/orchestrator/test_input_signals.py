@@ -202,6 +202,11 @@ def test_show_tells_what_is_driven(simulate: Simulate, tmp_path: Path) -> None:
     assert "x.csv -> a.u" in shown
     assert "a.u: no unit gives it" not in shown
     assert "a.step: no unit gives it" in shown
+    assert "does not judge what the signals of x.csv do" not in shown
+    scenario = load_scenario(tmp_path / "s.yaml", ["coupling.adaptive={max_ms: 50}"])
+    assert "does not judge what the signals of x.csv do inside of a step; keep `max_ms` (50 ms)" in show_scenario(
+        scenario, tmp_path
+    )
 
 
 def test_a_unit_of_our_own_is_driven_alike_directly_and_through_its_fmu(tmp_path: Path, fmu_dir: Path) -> None:
