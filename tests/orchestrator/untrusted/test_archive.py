@@ -37,9 +37,9 @@ def refused(path: Path, folder: Path) -> str:
 def test_what_is_packed_comes_out(tmp_path: Path) -> None:
     """A sound FMU could lose a member, or have its content changed."""
     content = os.urandom(3_000_000)
-    path = packed(
-        tmp_path / "a.fmu", ("./", b""), ("modelDescription.xml", b"<a/>"), ("./binaries/linux64/ä b.so", content)
-    )
+    folders = [("./", b""), ("binaries/", b""), ("./binaries/", b"")]
+    files = [("modelDescription.xml", b"<a/>"), ("./binaries/linux64/ä b.so", content)]
+    path = packed(tmp_path / "a.fmu", *folders, *files)
     (folder := tmp_path / "out").mkdir()
     with open_archive(path) as archive:
         assert "modelDescription.xml" in archive
