@@ -4,7 +4,7 @@ import csv
 import json
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -70,8 +70,7 @@ class ResultsFolder:
         with allowed(self.path, "--output"):
             self._remove_leftovers()
             (self.path / CHECKPOINT).unlink(missing_ok=True)
-            if (self.path / PARTS).exists():
-                shutil.rmtree(self.path / PARTS)
+            self._remove_parts()
         return dict(content)
 
     def checkpoint(self) -> Memories | None:
@@ -104,7 +103,8 @@ class ResultsFolder:
                 reserve(self.path / SUMMARY, _RESERVE)
             return self._opened(assembly, before, wall)
         except BaseException:
-            self._remove_leftovers()
+            with suppress(OSError):
+                self._remove_leftovers()
             raise
 
     # --- inside -------------------------------------------------------------------------------------------------------
@@ -120,6 +120,8 @@ class ResultsFolder:
         if assembly.mesh is None:
             for name in (FIELDS, XDMF):
                 remove_stale(self.path / name)
+            with writing(self.path / PARTS):
+                self._remove_parts()
         with allowed(self.path, "--output"), nullcontext() if before is None else self.fitting():
             return Recording(self.path, self._origin, assembly, before, wall)
 
@@ -135,6 +137,10 @@ class ResultsFolder:
         """Remove what was being written, or reserved, when a process was killed."""
         for name in WHOLE:
             unfinished(self.path / name).unlink(missing_ok=True)
+
+    def _remove_parts(self) -> None:
+        if (self.path / PARTS).exists():
+            shutil.rmtree(self.path / PARTS)
 
     def _holds(self, steps: int) -> bool:
         """Whether the results of so many steps are there."""

@@ -60,8 +60,10 @@ class FolderLock:
                         "with --output"
                     )
                 if self._is_in_place(descriptor):
-                    os.ftruncate(descriptor, 0)
-                    os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
+                    # For those who are refused; on a full disk they do not learn it.
+                    with suppress(OSError):
+                        os.ftruncate(descriptor, 0)
+                        os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
                     return descriptor
             except BaseException:
                 os.close(descriptor)

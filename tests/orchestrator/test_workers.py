@@ -152,7 +152,7 @@ def test_when_a_worker_is_killed_the_results_so_far_are_readable_and_the_run_can
         _, message = process.communicate(timeout=120)
     finally:
         process.kill()
-    assert process.returncode == 3
+    assert process.returncode == 3, message
     assert "the process it worked in is gone" in message
     assert json.loads((out / "summary.json").read_text())["status"] == "failed"
     series = (out / "timeseries.csv").read_bytes()
