@@ -2,10 +2,7 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .coupling.schemes import Sweeps
+from typing import Any
 
 from .quoting import shortened
 
@@ -17,12 +14,12 @@ class InputError(Exception):
 class RunError(Exception):
     """The physics, the coupling or the operating system failed (exit code 3).
 
-    The message says which unit, when, why and what to try. Where an iteration failed, `sweeps` are those of the step
-    to `time_ms` that was not accepted.
+    The message says which unit, when, why and what to try. Where an iteration failed, `sweeps` are those
+    (coupling.schemes.Sweeps) of the step to `time_ms` that was not accepted.
     """
 
     time_ms: float | None = None
-    sweeps: "Sweeps | None" = None
+    sweeps: Any = None
 
 
 class Terminated(RunError):
@@ -61,10 +58,10 @@ class ParticipantTerminated(ParticipantError):
 class NotConverged(Exception):
     """The iteration of a loop found no solution of the step; the master adds when it was.
 
-    `sweeps` is the history of the step's loops, this one included.
+    `sweeps` (coupling.schemes.Sweeps) is the history of the step's loops, this one included.
     """
 
-    def __init__(self, message: str, sweeps: "Sweeps") -> None:
+    def __init__(self, message: str, sweeps: Any) -> None:
         super().__init__(message)
         self.sweeps = sweeps
 
