@@ -78,9 +78,12 @@ class Workers:
                 nanny.auto_restart = False
                 with suppress(ProcessLookupError, TypeError):
                     os.kill(nanny.pid, signal.SIGKILL)
-        self._client.close(timeout=_CLOSING_S)
+        # A scheduler that does not come to an end in time, on a busy machine, is not to hide how the run ended.
+        with suppress(TimeoutError, OSError):
+            self._client.close(timeout=_CLOSING_S)
         if self._cluster is not None:
-            self._cluster.close(timeout=_CLOSING_S)
+            with suppress(TimeoutError, OSError):
+                self._cluster.close(timeout=_CLOSING_S)
 
 
 class _Host:
