@@ -79,11 +79,11 @@ class Workers:
                 nanny.auto_restart = False
                 with suppress(ProcessLookupError, TypeError):
                     os.kill(nanny.pid, signal.SIGKILL)
-        # What Dask has not put away on a busy machine by then goes with this process; the run is over all the same.
-        with suppress(TimeoutError):
+        # A scheduler that does not come to an end in time, on a busy machine, is not to hide how the run ended.
+        with suppress(TimeoutError, OSError):
             self._client.close(timeout=_CLOSING_S)
         if self._cluster is not None:
-            with suppress(TimeoutError):
+            with suppress(TimeoutError, OSError):
                 self._cluster.close(timeout=_CLOSING_S)
 
 
@@ -200,6 +200,8 @@ class RemoteParticipant:
         except (ParticipantError, InputError):
             raise
         except TimeoutError as error:
+            if self._limit_s is None:
+                raise self._lost() from error
             raise ParticipantLost(
                 f"it did not come back within {self._limit_s:g} s (run.unit_time_limit_s); "
                 "raise the limit if that is no sign of a hang"
