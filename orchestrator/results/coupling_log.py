@@ -26,8 +26,8 @@ class CouplingLog:
         folder: Path,
         units: Sequence[str],
         converged: Sequence[str] = (),
-        adaptive: bool = False,
         resumed: Mapping[str, Any] | None = None,
+        adaptive: bool = False,
     ) -> None:
         self._units = units
         self._converged = converged

@@ -85,7 +85,7 @@ class Recording:
             series = TimeSeries(folder, participants, assembly.probes, kept("series"))
             self._series: TimeSeries = add("series", series)
             converged, adaptive = list(assembly.converged), scenario.coupling.adaptive is not None
-            log = CouplingLog(folder, master.units, converged, adaptive, kept("log"))
+            log = CouplingLog(folder, master.units, converged, kept("log"), adaptive)
             self._log: CouplingLog = add("log", log)
             if converged:
                 self._iterations = add("iterations", IterationLog(folder, converged, kept("iterations")))

@@ -86,6 +86,8 @@ def is_summary(content: Mapping[str, Any]) -> bool:
     volumes = [content.get(f"{chamber}_volume_ml") for chamber in content["ejection_fraction"]]
     return (
         numbers([content["wall_s"].get("total"), *content["unconverged_ms"], *content["ejection_fraction"].values()])
+        and isinstance(content["tolerance_missed"].get("steps"), int)
+        and numbers(value for value in (content["tolerance_missed"].get("first_ms"),) if value is not None)
         and numbers(value for value in content["activation_time_ms"].values() if value is not None)
         and all(isinstance(volume, dict) and numbers([volume.get("start"), volume.get("min")]) for volume in volumes)
     )

@@ -64,9 +64,9 @@ def test_a_crash_in_clearing_away_takes_finished_work_not_back() -> None:
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
-def _started(tmp_path: Path, work: str) -> "subprocess.Popen[str]":
-    """The watched work, once it has written a file."""
-    work = f"open({str(tmp_path / 'pid')!r}, 'w').write(str(os.getpid())); {work}"
+def _started(tmp_path: Path, prepare: str = "pass") -> "subprocess.Popen[str]":
+    """Watched work that waits, once it is prepared and has written its number to a file."""
+    work = f"{prepare}; open({str(tmp_path / 'pid')!r}, 'w').write(str(os.getpid())); time.sleep(60)"
     process = subprocess.Popen(
         [sys.executable, "-c", _WATCHED.format(work=work)], text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE
     )
@@ -78,23 +78,21 @@ def _started(tmp_path: Path, work: str) -> "subprocess.Popen[str]":
 
 
 def test_signals_are_passed_on_once(tmp_path: Path) -> None:
-    heard = "signal.signal(signal.SIGINT, lambda *_: sys.exit(42)); time.sleep(30)"
-    process = _started(tmp_path, heard)
-    time.sleep(0.2)
+    process = _started(tmp_path, "signal.signal(signal.SIGINT, lambda *_: sys.exit(42))")
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
     assert process.returncode == 42
 
 
 def test_a_signal_that_ends_the_work_is_no_fault_of_it(tmp_path: Path) -> None:
-    process = _started(tmp_path, "time.sleep(30)")
+    process = _started(tmp_path)
     process.terminate()
     _, said = process.communicate(timeout=30)
     assert (process.returncode, said) == (128 + signal.SIGTERM, "")
 
 
 def test_the_work_dies_with_the_process_that_watches_it(tmp_path: Path) -> None:
-    process = _started(tmp_path, "time.sleep(60)")
+    process = _started(tmp_path)
     process.kill()
     process.communicate(timeout=30)
     child = int((tmp_path / "pid").read_text())
