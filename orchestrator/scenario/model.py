@@ -1,8 +1,7 @@
 """A scenario: what a person asks for in a YAML file, validated whole before anything runs."""
 
 import sys
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -12,13 +11,11 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    ValidationError,
     model_validator,
 )
 
-from .errors import InputError, did_you_mean
-from .quoting import quoted, shortened
-from .untrusted.yaml_text import LARGEST_TEXT, parse_yaml
+from ..errors import did_you_mean
+from ..quoting import quoted
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # A kilometre in mm is far outside of any anatomy, and near enough to be computed with.
@@ -34,26 +31,14 @@ _LONGEST_NAME = 200
 #: Bytes of a path, and of each of its parts.
 _LONGEST_PATH, _LONGEST_PART = 4000, 255
 
-#: Problems of one file that are told, and characters of those of the command line that are repeated with each.
-_MOST_PROBLEMS, _LONGEST_ORIGIN = 20, 300
-
-#: Sections in sections that `--set` can name.
-_DEEPEST_KEY = 20
-
 #: More communication steps than any run can take are a slip of the pen.
 _MOST_STEPS = 10_000_000
 
-#: What a name has to look like, and how to say that to a person.
-_NAME = r"^\w[\w.-]*$"
-_UNIT_NAME = r"^[A-Za-z]\w*$"
-_PROBE_NAME = r"^\w+$"
-_WORKERS = r"^(threads|processes|(tcp|tls|ws|wss|ucx)://\S+)$"
-_ALLOWED = {
-    _WORKERS: "choose threads, processes, or the address of a Dask scheduler, tcp://host:port",
-    _NAME: "begin with a letter or digit, then letters, digits, '_', '-' and '.'",
-    _UNIT_NAME: "begin with a letter, then letters, digits and '_'",
-    _PROBE_NAME: "use letters, digits and '_'",
-}
+#: What a name has to look like; how that is said to a person stands in `problem`.
+NAME = r"^\w[\w.-]*$"
+UNIT_NAME = r"^[A-Za-z]\w*$"
+PROBE_NAME = r"^\w+$"
+WORKERS = r"^(threads|processes|(tcp|tls|ws|wss|ucx)://\S+)$"
 
 
 def _scalar(value: Any) -> Any:
@@ -194,7 +179,7 @@ class ConnectionEntry(_Section):
 
 
 #: How pydantic marks in which of its two forms a connection was read; no person has to see that.
-_AS_TEXT, _AS_ENTRY = "[text]", "[entry]"
+AS_TEXT, AS_ENTRY = "[text]", "[entry]"
 
 
 def _form(given: Any) -> str:
@@ -202,12 +187,12 @@ def _form(given: Any) -> str:
     is_entry = isinstance(given, ConnectionEntry) or (
         isinstance(given, Mapping) and not {"from", "output", "to", "input"}.isdisjoint(given)
     )
-    return _AS_ENTRY if is_entry else _AS_TEXT
+    return AS_ENTRY if is_entry else AS_TEXT
 
 
 #: A connection as 'unit.output -> unit.input', or in its parts.
 Written = Annotated[
-    Annotated[str, Tag(_AS_TEXT)] | Annotated[ConnectionEntry, Tag(_AS_ENTRY)],
+    Annotated[str, Tag(AS_TEXT)] | Annotated[ConnectionEntry, Tag(AS_ENTRY)],
     Discriminator(_form),
 ]
 
@@ -288,7 +273,7 @@ class Run(_Section):
 
     stop_ms: Positive = 320.0
     participants: Literal["fmu", "fmu3", "native"] = "fmu"
-    workers: Annotated[str | None, Field(pattern=_WORKERS)] = None
+    workers: Annotated[str | None, Field(pattern=WORKERS)] = None
     unit_time_limit_s: Positive | None = None
     checkpoint_every: Annotated[int, Field(ge=0, le=_MOST)] = 20
 
@@ -308,7 +293,7 @@ class Output(_Section):
 
     every_ms: Positive = 5.0
     variables: Annotated[list[str] | None, Field(min_length=1)] = None
-    probes_mm: dict[Annotated[str, Field(pattern=_PROBE_NAME), AfterValidator(_name)], Point] = Field(
+    probes_mm: dict[Annotated[str, Field(pattern=PROBE_NAME), AfterValidator(_name)], Point] = Field(
         default_factory=dict
     )
 
@@ -320,10 +305,10 @@ class Scenario(_Section):
     `inputs` drive what is not connected.
     """
 
-    name: Annotated[str, Field(pattern=_NAME), AfterValidator(_name)]
+    name: Annotated[str, Field(pattern=NAME), AfterValidator(_name)]
     scene: Scene | None = None
     units: Annotated[
-        dict[Annotated[str, Field(pattern=_UNIT_NAME), AfterValidator(_name)], UnitEntry], Field(min_length=1)
+        dict[Annotated[str, Field(pattern=UNIT_NAME), AfterValidator(_name)], UnitEntry], Field(min_length=1)
     ]
     connections: list[Written] = Field(default_factory=list)
     connect_by_name: bool = True
@@ -412,135 +397,3 @@ class Scenario(_Section):
 
 def _is_whole(steps: float) -> bool:
     return round(steps) >= 1 and abs(steps - round(steps)) <= _WHOLE * steps
-
-
-def load_scenario(path: Path, assignments: Sequence[str] = ()) -> Scenario:
-    """Read `path` and apply `assignments` (each `key.path=value`); InputError names the key and the remedy."""
-    content = _read(path)
-    if content is None:
-        raise InputError(f"{path}: the file is empty; a scenario needs at least `name`, `scene` and `units`")
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: a scenario is lines `key: value` with the keys {', '.join(Scenario.model_fields)}")
-    return checked(content, path, assignments)
-
-
-def checked(content: dict[str, Any], path: Path, assignments: Sequence[str] = ()) -> Scenario:
-    """The scenario of a file's `content`, changed by `assignments`; InputError begins with the file's `path`."""
-    for assignment in assignments:
-        _assign(content, assignment)
-    try:
-        return Scenario.model_validate(content)
-    except ValidationError as error:
-        problems = list(dict.fromkeys(_explain(problem) for problem in error.errors()))
-        if len(problems) > _MOST_PROBLEMS:
-            problems[_MOST_PROBLEMS:] = [f"and {len(problems) - _MOST_PROBLEMS} more problems"]
-        origin = str(path)
-        if assignments:
-            origin += " with " + shortened(", ".join(f"--set {text}" for text in assignments), _LONGEST_ORIGIN)
-        raise InputError(f"{origin}: " + f"\n{origin}: ".join(problems)) from None
-
-
-def _read(path: Path) -> Any:
-    try:
-        with path.open("rb") as file:
-            return parse_yaml(file.read(LARGEST_TEXT + 1))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such scenario file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: this is a folder; give the scenario's YAML file") from None
-    except OSError as error:
-        raise InputError(f"{path}: the scenario file cannot be read ({error.strerror})") from None
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from None
-
-
-def _assign(content: dict[str, Any], assignment: str) -> None:
-    key, separator, text = assignment.partition("=")
-    *parents, last = [part.strip() for part in key.split(".")]
-    told = shortened(assignment, _LONGEST_ORIGIN)
-    if not separator or not all((*parents, last)) or len(parents) > _DEEPEST_KEY or not key.isprintable():
-        raise InputError(f"--set {told}: write it as key.path=value, e.g. --set run.stop_ms=100")
-    try:
-        value = parse_yaml(text)
-    except ValueError as error:
-        raise InputError(f"--set {told}: the value is {error}") from None
-    target = content
-    for number, parent in enumerate(parents):
-        section = target.get(parent)
-        if not isinstance(section, dict | None):
-            whole = shortened(".".join(parents[: number + 1]))
-            raise InputError(
-                f"--set {told}: '{shortened(parent)}' holds {_short(section)}, not a section; set it as a whole, "
-                f"--set {whole}=..."
-            )
-        # A copy: in YAML two sections can be one and the same, by an alias.
-        target[parent] = dict(section or {})
-        target = target[parent]
-    target[last] = value
-
-
-def _explain(problem: Mapping[str, Any]) -> str:
-    location = [shortened(str(part)) for part in problem["loc"] if part not in ("[key]", _AS_TEXT, _AS_ENTRY)]
-    kind, given = problem["type"], problem["input"]
-    key, is_key = ".".join(location), "[key]" in problem["loc"]
-    context = problem.get("ctx", {})
-    if kind == "extra_forbidden":
-        return f"unknown key '{key}'{did_you_mean(location[-1], _keys_at(location[:-1]))}"
-    if kind == "missing":
-        return f"the key '{key}' is missing"
-    if kind == "value_error":
-        return f"'{key}': {context['error']}" if key else str(context["error"])
-    if kind == "invalid_key" or (is_key and kind == "string_type"):
-        return (
-            f"'{key}': a key has to be text, not {_short(given)}; put it in quotes "
-            "(or, if it is the rest of a number, write that with a point: 0.5)"
-        )
-    if kind == "string_pattern_mismatch":
-        what = "choice" if context["pattern"] == _WORKERS else "name"
-        return f"'{key}': {_short(given)} is no valid {what}; {_ALLOWED[context['pattern']]}"
-    if kind == "literal_error":
-        return f"'{key}' is {_short(given)}: it should be {context['expected']}{_nearest(given, context['expected'])}"
-    return f"'{key}' is {_short(given)}: {_expected(kind, given, problem)}"
-
-
-def _expected(kind: str, given: Any, problem: Mapping[str, Any]) -> str:
-    """What should be there instead of `given`, and what to do about it."""
-    if kind in ("model_type", "dict_type", "model_attributes_type", "too_short") and not given:
-        return "the section has no content; fill it or remove the key"
-    if kind in ("model_type", "dict_type", "model_attributes_type"):
-        return "expected a section, lines `key: value` or {key: value, ...}"
-    if problem["loc"][:2] == ("output", "probes_mm") and kind in ("list_type", "too_short", "too_long"):
-        return "expected the three coordinates of a point in mm, [x, y, z]"
-    if kind == "list_type":
-        return "expected a list, lines `- item` or [item, item]"
-    if kind == "string_type":
-        return "expected a text" + ("" if given is None else "; put it in quotes")
-    if kind in ("float_type", "int_type", "float_parsing"):
-        unit = "; its unit of measure is the one the key's name ends in" if isinstance(given, str) else ""
-        return f"expected a number, written alone and without quotes{unit}"
-    if kind == "none_required":
-        return "only null is possible yet; remove the key"
-    message: str = problem["msg"]
-    return message.replace("Input should be", "it should be")
-
-
-def _nearest(given: Any, expected: str) -> str:
-    names = [name.strip("' ") for name in expected.replace(" or ", ",").split(",")]
-    hint = did_you_mean(str(given), names) if isinstance(given, str) else ""
-    return hint if hint.startswith(";") and len(names) > 1 else ""
-
-
-def _short(given: Any) -> str:
-    return "empty" if given is None else quoted(given)
-
-
-def _keys_at(location: Sequence[str]) -> list[str]:
-    """The keys that the section at `location` may have."""
-    sections: dict[str, type[BaseModel]] = {"scene": Scene, "coupling": Coupling, "run": Run, "output": Output}
-    sections |= {"connections": ConnectionEntry, "inputs": Inputs}
-    section = UnitEntry if location[:1] == ["units"] else sections.get(location[0], Scenario) if location else Scenario
-    if location[:2] == ["coupling", "adaptive"]:
-        section = Adaptive
-    if location[:2] == ["coupling", "iterate"]:
-        section = CriterionEntry if location[2:3] == ["converge"] else Iterate
-    return [field.alias or name for name, field in section.model_fields.items()]

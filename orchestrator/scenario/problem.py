@@ -1,0 +1,103 @@
+"""What is wrong with a scenario's content, as a sentence for a person: the key, what was written, and the remedy."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel
+
+from ..errors import did_you_mean
+from ..quoting import quoted, shortened
+from .model import (
+    AS_ENTRY,
+    AS_TEXT,
+    NAME,
+    PROBE_NAME,
+    UNIT_NAME,
+    WORKERS,
+    Adaptive,
+    ConnectionEntry,
+    Coupling,
+    CriterionEntry,
+    Inputs,
+    Iterate,
+    Output,
+    Run,
+    Scenario,
+    Scene,
+    UnitEntry,
+)
+
+_ALLOWED = {
+    WORKERS: "choose threads, processes, or the address of a Dask scheduler, tcp://host:port",
+    NAME: "begin with a letter or digit, then letters, digits, '_', '-' and '.'",
+    UNIT_NAME: "begin with a letter, then letters, digits and '_'",
+    PROBE_NAME: "use letters, digits and '_'",
+}
+
+
+def explained(problem: Mapping[str, Any]) -> str:
+    """The sentence for one of pydantic's errors."""
+    location = [shortened(str(part)) for part in problem["loc"] if part not in ("[key]", AS_TEXT, AS_ENTRY)]
+    kind, given = problem["type"], problem["input"]
+    key, is_key = ".".join(location), "[key]" in problem["loc"]
+    context = problem.get("ctx", {})
+    if kind == "extra_forbidden":
+        return f"unknown key '{key}'{did_you_mean(location[-1], _keys_at(location[:-1]))}"
+    if kind == "missing":
+        return f"the key '{key}' is missing"
+    if kind == "value_error":
+        return f"'{key}': {context['error']}" if key else str(context["error"])
+    if kind == "invalid_key" or (is_key and kind == "string_type"):
+        return (
+            f"'{key}': a key has to be text, not {_short(given)}; put it in quotes "
+            "(or, if it is the rest of a number, write that with a point: 0.5)"
+        )
+    if kind == "string_pattern_mismatch":
+        what = "choice" if context["pattern"] == WORKERS else "name"
+        return f"'{key}': {_short(given)} is no valid {what}; {_ALLOWED[context['pattern']]}"
+    if kind == "literal_error":
+        return f"'{key}' is {_short(given)}: it should be {context['expected']}{_nearest(given, context['expected'])}"
+    return f"'{key}' is {_short(given)}: {_expected(kind, given, problem)}"
+
+
+def _expected(kind: str, given: Any, problem: Mapping[str, Any]) -> str:
+    """What should be there instead of `given`, and what to do about it."""
+    if kind in ("model_type", "dict_type", "model_attributes_type", "too_short") and not given:
+        return "the section has no content; fill it or remove the key"
+    if kind in ("model_type", "dict_type", "model_attributes_type"):
+        return "expected a section, lines `key: value` or {key: value, ...}"
+    if problem["loc"][:2] == ("output", "probes_mm") and kind in ("list_type", "too_short", "too_long"):
+        return "expected the three coordinates of a point in mm, [x, y, z]"
+    if kind == "list_type":
+        return "expected a list, lines `- item` or [item, item]"
+    if kind == "string_type":
+        return "expected a text" + ("" if given is None else "; put it in quotes")
+    if kind in ("float_type", "int_type", "float_parsing"):
+        unit = "; its unit of measure is the one the key's name ends in" if isinstance(given, str) else ""
+        return f"expected a number, written alone and without quotes{unit}"
+    if kind == "none_required":
+        return "only null is possible yet; remove the key"
+    message: str = problem["msg"]
+    return message.replace("Input should be", "it should be")
+
+
+def _nearest(given: Any, expected: str) -> str:
+    names = [name.strip("' ") for name in expected.replace(" or ", ",").split(",")]
+    hint = did_you_mean(str(given), names) if isinstance(given, str) else ""
+    return hint if hint.startswith(";") and len(names) > 1 else ""
+
+
+def _short(given: Any) -> str:
+    return "empty" if given is None else quoted(given)
+
+
+def _keys_at(location: Sequence[str]) -> list[str]:
+    """The keys that the section at `location` may have."""
+    sections: dict[str, type[BaseModel]] = {"scene": Scene, "coupling": Coupling, "run": Run, "output": Output}
+    sections |= {"connections": ConnectionEntry, "inputs": Inputs}
+    section = UnitEntry if location[:1] == ["units"] else sections.get(location[0], Scenario) if location else Scenario
+    if location[:2] == ["coupling", "adaptive"]:
+        section = Adaptive
+    if location[:2] == ["coupling", "iterate"]:
+        section = CriterionEntry if location[2:3] == ["converge"] else Iterate
+    return [field.alias or name for name, field in section.model_fields.items()]
