@@ -185,13 +185,14 @@ def _check(members: list[zipfile.ZipInfo], size: int) -> None:
     """InputError if the `members` of an archive of `size` bytes cannot all be unpacked, or are not to be."""
     if len(members) > _MOST_MEMBERS:
         raise InputError(f"it has more than {_MOST_MEMBERS} members; pack only what is needed")
-    seen: dict[str, bool] = {}
+    seen: dict[str, tuple[bool, int, int]] = {}
     for member in members:
         name = _place(member)
-        # Some tools write a folder once for each that they put something into.
-        if name and name in seen and not (member.is_dir() and seen[name]):
-            raise InputError(f"its member {quoted(name)} stands twice in it; keep one of the two")
-        seen[name] = member.is_dir()
+        content = member.is_dir(), member.file_size, member.CRC
+        # Some tools write a folder, or a file, once for each other that it belongs to.
+        if name and seen.get(name, content) != content:
+            raise InputError(f"its member {quoted(name)} stands twice in it, and differs; keep one of the two")
+        seen[name] = content
         if member.flag_bits & _ENCRYPTED:
             raise InputError(f"its member {quoted(name)} is encrypted; pack it without a password")
         if member.compress_type not in _METHODS:

@@ -79,6 +79,12 @@ def test_two_members_of_one_name_are_refused(tmp_path: Path) -> None:
     assert "stands twice" in refused(path, tmp_path / "out")
     assert "stands twice" in refused(packed(tmp_path / "b.fmu", ("x", b"1"), ("./x", b"2")), tmp_path / "out2")
     assert "cannot be unpacked" in refused(packed(tmp_path / "c.fmu", ("x", b"1"), ("x/y", b"2")), tmp_path / "out3")
+    # Public FMUs have the same file twice, from each of the tools that had a hand in them.
+    with pytest.warns(UserWarning, match="Duplicate"):
+        path = packed(tmp_path / "d.fmu", ("x", b"1"), ("x", b"1"))
+    with open_archive(path) as archive:
+        archive.extract(tmp_path / "out4")
+    assert (tmp_path / "out4" / "x").read_bytes() == b"1"
 
 
 def test_other_methods_and_passwords_are_refused_by_name(tmp_path: Path) -> None:
