@@ -75,6 +75,11 @@ def fingerprint(unit: type[Unit], mesh: Mesh) -> str:
     return content_hash(head, Path(__file__).parent.glob("*.py"), sources(), mesh)
 
 
+def guid_of(key: str) -> str:
+    """What an FMU with the fingerprint `key` is known by, in its description and to its binary."""
+    return f"{{{uuid.uuid5(uuid.NAMESPACE_OID, key)}}}"
+
+
 def content_hash(head: bytes, builders: Iterable[Path], files: dict[str, bytes], mesh: Mesh) -> str:
     """A hash of `head`, of the code that builds an FMU, and of the code and the mesh that it carries."""
     digest = hashlib.sha256(head)
@@ -89,7 +94,7 @@ def content_hash(head: bytes, builders: Iterable[Path], files: dict[str, bytes],
 def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
     """Write the FMU of `unit` on `mesh` to the file `destination` and return it."""
     key = fingerprint(unit, mesh)
-    guid = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, key)}}}"
+    guid = guid_of(key)
     package, code = package_of(sources())
     with tempfile.TemporaryDirectory(prefix="cosim-build-") as folder:
         work = Path(folder)

@@ -8,17 +8,20 @@ from platformdirs import user_cache_path
 
 from ..units.mesh import Mesh
 from ..units.unit import Unit
-from .build import build_fmu, fingerprint
+from .build import build_fmu, fingerprint, guid_of
 from .fmi3.build import build_fmu as build_fmi3
 from .fmi3.build import fingerprint as fingerprint_fmi3
+
+#: Bytes of a model description in which the root element's attributes stand.
+_HEAD = 1000
 
 
 def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: int = 2) -> Path:
     """The FMU of `unit` on `mesh`, built if there is none of the same content, for FMI 2.0 or (`fmi` is 3) FMI 3.0.
 
     The fingerprint of code and mesh is part of the path, so that an FMU of other code or of another mesh is never
-    taken. One that is damaged, or that cannot be read, is built anew; as every FMU takes its place in one piece, two
-    builders at once do no harm. Without `folder` it is `fmus` in the user's cache of this program.
+    taken. One that is damaged, is another, or cannot be read is built anew; as every FMU takes its place in one piece,
+    two builders at once do no harm. Without `folder` it is `fmus` in the user's cache of this program.
 
     OSError where the FMU cannot be built there.
     """
@@ -27,7 +30,7 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
         raise ValueError(f"there are FMUs of FMI 2 and 3, not {fmi}")
     key, build = (fingerprint(unit, mesh), build_fmu) if fmi == 2 else (fingerprint_fmi3(unit, mesh), build_fmi3)
     path = root / key[:16] / f"{unit.name}.fmu"
-    return path if _whole(path) else build(unit, mesh, path)
+    return path if _holds(path, guid_of(key)) else build(unit, mesh, path)
 
 
 def _user_cache() -> Path:
@@ -38,11 +41,11 @@ def _user_cache() -> Path:
     return path
 
 
-def _whole(path: Path) -> bool:
-    """Whether there is an FMU at `path`, readable and with all its bytes as they were written."""
+def _holds(path: Path, guid: str) -> bool:
+    """Whether the FMU at `path` is the one that is known by `guid`, readable and with all its bytes as written."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            return "modelDescription.xml" in archive.namelist() and archive.testzip() is None
+        with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as description:
+            return guid.encode() in description.read(_HEAD) and archive.testzip() is None
     # A damaged archive ends in whatever its damaged part is taken for: a kind of compression, an encryption, a size.
     except Exception:
         return False

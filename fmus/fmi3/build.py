@@ -5,7 +5,6 @@ is that of pythonfmu3.
 """
 
 import tempfile
-import uuid
 from importlib.metadata import distribution, version
 from importlib.resources import files
 from pathlib import Path
@@ -78,7 +77,7 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
     stub = f"{unit.name}_{key[:16]}"
     text = _STUB.format(unit=unit.name, package=package, name=unit.__name__ + key[:16], missing=MISSING_PACKAGE)
     tool = f"{TOOL} {version(TOOL)} with PythonFMU3 {version('pythonfmu3')}"
-    token = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, key)}}}"
+    token = fmi2.guid_of(key)
     with tempfile.TemporaryDirectory(prefix="cosim-build-") as folder:
         work = Path(folder)
         pack_mesh(mesh, work / MESH_FILE)

@@ -120,6 +120,9 @@ def test_a_damaged_fmu_in_the_cache_is_built_anew(tiny: Mesh, tmp_path: Path) ->
     for begin, size in chance.choices([(begin, size) for begin, size in members if size > 0], k=8):
         place = begin + chance.randrange(size)
         damaged.append(good[:place] + bytes([good[place] ^ 4]) + good[place + 1 :])
+    # A whole FMU, but of another unit.
+    other = next(unit for unit in UNITS.values() if unit is not _UNIT)
+    damaged.append(build.build_fmu(other, tiny, tmp_path / "other.fmu").read_bytes())
     for content in damaged:
         path.write_bytes(content)
         assert cache.cached_fmu(_UNIT, tiny, tmp_path) == path
