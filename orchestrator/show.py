@@ -154,7 +154,7 @@ def _warnings(scenario: Scenario, mesh: Mesh | None) -> Iterator[str]:
                 "waves are too fast (consistent mass) or too slow (lumped); compare with a finer mesh_size_mm"
             )
     coupling = scenario.coupling
-    if coupling.adaptive is None and coupling.step_ms > _UPSTROKE_MS:
+    if mesh is not None and coupling.adaptive is None and coupling.step_ms > _UPSTROKE_MS:
         yield f"coupling.step_ms of {coupling.step_ms:g} ms is longer than an upstroke of {_UPSTROKE_MS:g} ms"
 
 

@@ -20,7 +20,7 @@ from .timeline import Timeline
 _RELAXATION = 0.5
 
 #: What is asked of a field that a loop's sweeps start from and that no criterion names (`convergence`).
-_UNNAMED = "has no criterion: as still, relative to its magnitude, as the strictest of those given asks for"
+_UNNAMED = "no criterion of its own; relative to its magnitude, its residual is held to the strictest of those given"
 
 
 def build_scheme(

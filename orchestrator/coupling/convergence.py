@@ -5,10 +5,10 @@ With the residual r = H(x) − x a field's criterion has the measures of preCICE
 values. Of several measures given for one field any one is enough, so that `absolute` with `relative` is the usual pair
 for a field that may vanish.
 
-A field that a sweep starts from and that has no criterion of its own has to be as still, relative to its magnitude, as
-the strictest of those that have one is asked to be. Were it not judged, a loop would be accepted before anything had
-arrived at the fields that are: under Jacobi a change needs as many sweeps as the loop has units to come round. A field
-that is computed anew within a sweep, and from what the sweep started from, is consistent with that by itself.
+The residual of a field that a sweep starts from and that has no criterion of its own, relative to that field's
+magnitude, is held to the strictest of the criteria given. Were it not judged, a loop would be accepted before anything
+had arrived at the fields that are: under Jacobi a change needs as many sweeps as the loop has units to come round. A
+field that is computed anew within a sweep, and from what the sweep started from, is consistent with that by itself.
 """
 
 from collections.abc import Collection, Mapping

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
 from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
-from cardiac_cosim.orchestrator.run import run_scenario
+from cardiac_cosim.orchestrator.run import run_scenario, show_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 
 
@@ -145,6 +145,20 @@ def test_an_fmu_that_cannot_ramp_holds_the_value_at_the_end_of_the_step(simulate
     error = [np.abs(_states(series) - _MASSES.exact(2.0)).max() for series in (both, one)]
     assert error[0] < 0.2 * error[1]
     assert error[1] < 0.1
+
+
+def test_inputs_that_are_held_although_linear_ones_are_asked_for_are_shown(
+    bodies: dict[str, Path], tmp_path: Path
+) -> None:
+    text = _SCENARIO.replace("FIRST", str(bodies["whole"])).replace("SECOND", str(bodies["holding"]))
+    (tmp_path / "oscillator.yaml").write_text(text)
+
+    def held(*sets: str) -> list[str]:
+        lines = show_scenario(load_scenario(tmp_path / "oscillator.yaml", sets), tmp_path).splitlines()
+        return [line.split(":")[0].strip() for line in lines if "held over every step" in line]
+
+    assert held("coupling.interpolation=linear") == ["second.x_in", "second.v_in"]
+    assert held() == []
 
 
 def test_adaptive_steps_of_foreign_fmus_meet_a_smaller_tolerance_with_a_smaller_error(simulate: Any) -> None:

@@ -34,6 +34,21 @@ def test_mesh_units_connections_loop_and_order(small_scenario: Path, small_heart
     assert "mechanics: 10 solves" in shown["exchange"]
 
 
+def test_every_field_that_has_to_converge_is_named_with_its_criterion(small_scenario: Path) -> None:
+    iterate = "coupling.iterate={converge: {stretch: {relative: 1e-4, absolute: 1e-6}}}"
+    named = "mechanics.stretch: absolute 1e-06 or relative 0.0001"
+    # Under Gauss–Seidel the others are computed from the stretch in the same sweep.
+    assert _show(small_scenario, iterate)["convergence"] == [named]
+    jacobi = _show(small_scenario, iterate, "coupling.scheme=jacobi")["convergence"]
+    assert jacobi[0] == named
+    assert [line.partition(":")[0] for line in jacobi[1:]] == [
+        "electrophysiology.potential",
+        "active_stress.active_stress",
+    ]
+    assert all("held to the strictest of those given" in line for line in jacobi[1:])
+    assert "convergence" not in _show(small_scenario)
+
+
 def test_what_is_not_modelled_is_named_with_the_reason_and_what_it_saves(small_scenario: Path, tmp_path: Path) -> None:
     quiet = "units.electrophysiology.parameters={stimulus_depth_mm: 5, stretch_conductance: 0}"
     shown = _show(small_scenario, quiet)
