@@ -68,7 +68,7 @@ def run(
                 print(f"interrupted; the results so far are in {folder}{rest}", file=sys.stderr)
                 raise typer.Exit(INTERRUPTED + error.signal) from None
     for warning in outcome.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        _warn(warning)
     _report(scenario, outcome.folder, outcome.summary)
 
 
@@ -88,11 +88,14 @@ def build(
 ) -> None:
     """Build the FMU of every unit in a scenario: one <unit name>.fmu each, on the scenario's mesh."""
     from .build import build_fmus, write_container_file, write_osp_files, write_package
+    from .scene_warnings import scene_warnings
 
     with _opened(file, assignments or []) as (scenario, base), _about(file):
         if fmi == 3 and (ssp or osp or container):
             raise InputError("--ssp, --osp and --container are for FMUs of FMI 2.0; leave --fmi 3 out")
         built = build_fmus(scenario, base, output, may_be_none=ssp or osp or container, fmi=fmi)
+        for text in scene_warnings(scenario, built.mesh):
+            _warn(text)
         for path in built.fmus.values():
             typer.echo(path)
         if ssp:
