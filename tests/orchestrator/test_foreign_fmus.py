@@ -1,6 +1,5 @@
 """If these fail, the master couples hearts only: FMUs from elsewhere are driven otherwise than FMI 2.0 says."""
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -8,27 +7,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import build_body
 import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
 from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
 from cardiac_cosim.orchestrator.run import run_scenario, show_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from oscillator import Oscillator
 
-
-def _module(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-_builder = _module(Path(__file__).parent / "foreign" / "build_body.py")
-Oscillator = _module(Path(__file__).with_name("oscillator.py")).Oscillator
-pytestmark = pytest.mark.skipif(_builder.compiler() is None, reason="no C compiler to build foreign FMUs with")
+pytestmark = pytest.mark.skipif(build_body.compiler() is None, reason="no C compiler to build foreign FMUs with")
 
 # Force–displacement coupling: the second mass holds the spring between them and gives its force.
 _SCENARIO = """\
@@ -52,12 +40,12 @@ _MASSES = Oscillator()
 def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("bodies")
     return {
-        "whole": _builder.build_body(folder / "whole.fmu"),
-        "stateless": _builder.build_body(folder / "stateless.fmu", state=False),
-        "equal": _builder.build_body(folder / "equal.fmu", variable_step=False),
-        "holding": _builder.build_body(folder / "holding.fmu", ramps=False),
+        "whole": build_body.build_body(folder / "whole.fmu"),
+        "stateless": build_body.build_body(folder / "stateless.fmu", state=False),
+        "equal": build_body.build_body(folder / "equal.fmu", variable_step=False),
+        "holding": build_body.build_body(folder / "holding.fmu", ramps=False),
     } | {
-        quirk.lower(): _builder.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
+        quirk.lower(): build_body.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
         for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES", "LEAVES", "BREAKS")
     }
 

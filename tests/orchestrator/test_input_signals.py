@@ -1,12 +1,11 @@
 """If these fail, a measured input drives a unit with other values, or at other times, than the file has."""
 
 import csv
-import importlib.util
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import build_box
 import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.coupling.master import Master
@@ -14,19 +13,7 @@ from cardiac_cosim.orchestrator.errors import InputError, RunError
 from cardiac_cosim.orchestrator.run import run_scenario, show_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 
-
-def _module(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-_builder = _module(Path(__file__).parent / "foreign" / "build_box.py")
-needs_compiler = pytest.mark.skipif(_builder.compiler() is None, reason="no C compiler to build foreign FMUs with")
+needs_compiler = pytest.mark.skipif(build_box.compiler() is None, reason="no C compiler to build foreign FMUs with")
 
 _VARIABLES = [
     ("u", "Real", "input", 0),
@@ -67,7 +54,7 @@ def simulate(tmp_path: Path) -> Simulate:
 
     def run(text: str, *sets: str, interpolates: bool = True) -> list[dict[str, str]]:
         attributes = 'canInterpolateInputs="true"' if interpolates else ""
-        _builder.build_box(tmp_path / "a.fmu", _VARIABLES, attributes=attributes)
+        build_box.build_box(tmp_path / "a.fmu", _VARIABLES, attributes=attributes)
         (tmp_path / "x.csv").write_text(text, encoding="utf-8")
         (tmp_path / "s.yaml").write_text(_SCENARIO)
         run_scenario(load_scenario(tmp_path / "s.yaml", sets), tmp_path, tmp_path / "out")

@@ -1,7 +1,5 @@
 """If these fail, a scheme is not the one that theory speaks of: of another order, or stable where it should not be."""
 
-import importlib.util
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,14 +11,7 @@ from cardiac_cosim.orchestrator.coupling.exchange import Exchange, Inputs
 from cardiac_cosim.orchestrator.coupling.iteration import Iterated, Limits
 from cardiac_cosim.orchestrator.coupling.master import Accepted
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
-
-_spec = importlib.util.spec_from_file_location("oscillator", Path(__file__).with_name("oscillator.py"))
-assert _spec is not None
-assert _spec.loader is not None
-_module = importlib.util.module_from_spec(_spec)
-__import__("sys").modules["oscillator"] = _module
-_spec.loader.exec_module(_module)
-Oscillator = _module.Oscillator
+from oscillator import Oscillator
 
 _SPLITS = ["FD", "DD"]
 _SCHEMES = ["jacobi", "gauss-seidel"]

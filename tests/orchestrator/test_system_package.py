@@ -1,16 +1,15 @@
 """If these fail, a scenario that goes through a system package comes out as another one, or other people's systems run
 otherwise than they wrote them."""
 
-import importlib.util
 import json
 import re
 import shutil
-import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import build_body
 import h5py
 import numpy as np
 import pytest
@@ -25,19 +24,6 @@ _SCENARIOS = _ROOT / "scenarios"
 _COARSE = ("scene.mesh_size_mm=4", "run.stop_ms=20")
 
 Cosim = Callable[..., Any]
-
-
-def _module(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-_builder = _module(Path(__file__).parent / "foreign" / "build_body.py")
 
 
 def _set(*assignments: str) -> list[str]:
@@ -222,7 +208,7 @@ def test_fmpy_alone_cannot_begin_a_heart(cosim: Cosim, tmp_path: Path) -> None:
 
 # --- other people's packages ------------------------------------------------------------------------------------------
 
-needs_compiler = pytest.mark.skipif(_builder.compiler() is None, reason="no C compiler to build foreign FMUs with")
+needs_compiler = pytest.mark.skipif(build_body.compiler() is None, reason="no C compiler to build foreign FMUs with")
 
 _SSD = """\
 <?xml version="1.0" encoding="UTF-8"?>
@@ -310,7 +296,7 @@ output: {every_ms: 2000}
 @pytest.fixture(scope="session")
 def mass(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An FMU in C: a mass on a spring."""
-    return _builder.build_body(tmp_path_factory.mktemp("mass") / "mass.fmu")
+    return build_body.build_body(tmp_path_factory.mktemp("mass") / "mass.fmu")
 
 
 @pytest.fixture

@@ -1,35 +1,22 @@
 """If these fail, a variable of somebody's FMU is lost, or arrives as another value than the FMU gave."""
 
 import csv
-import importlib.util
 import json
 import re
 import subprocess
-import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import build_box
 import pytest
 from cardiac_cosim.orchestrator.coupling.master import Master
 from cardiac_cosim.orchestrator.errors import InputError, RunError
 from cardiac_cosim.orchestrator.run import run_scenario, show_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 
-
-def _module(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-_builder = _module(Path(__file__).parent / "foreign" / "build_box.py")
-pytestmark = pytest.mark.skipif(_builder.compiler() is None, reason="no C compiler to build foreign FMUs with")
+pytestmark = pytest.mark.skipif(build_box.compiler() is None, reason="no C compiler to build foreign FMUs with")
 
 _TYPES = (
     "<TypeDefinitions><SimpleType name='Mode'><Enumeration><Item name='off' value='1'/><Item name='on' value='4'/>"
@@ -63,8 +50,8 @@ def simulate(tmp_path: Path) -> Simulate:
     def run(
         a: Any, b: Any = None, extra: str = "", *sets: str, head: str = _TYPES, **rest: Any
     ) -> list[dict[str, str]]:
-        _builder.build_box(tmp_path / "a.fmu", a, head, **rest)
-        _builder.build_box(tmp_path / "b.fmu", _ALL if b is None else b, head)
+        build_box.build_box(tmp_path / "a.fmu", a, head, **rest)
+        build_box.build_box(tmp_path / "b.fmu", _ALL if b is None else b, head)
         units = {"a": {"fmu": "a.fmu"} | _given(a), "b": {"fmu": "b.fmu"} | _given(_ALL if b is None else b)}
         (tmp_path / "s.yaml").write_text(
             f"name: s\nunits: {json.dumps(units)}\nconnect_by_name: false\ncoupling: {{step_ms: 1000}}\n"
@@ -308,7 +295,7 @@ def test_a_library_that_needs_another_one_is_told_apart_from_a_damaged_one(simul
 
 
 def test_a_second_instance_of_an_fmu_that_allows_one_needs_a_process_of_its_own(tmp_path: Path) -> None:
-    _builder.build_box(tmp_path / "a.fmu", _ALL, _TYPES, 'canBeInstantiatedOnlyOncePerProcess="true"')
+    build_box.build_box(tmp_path / "a.fmu", _ALL, _TYPES, 'canBeInstantiatedOnlyOncePerProcess="true"')
     (tmp_path / "s.yaml").write_text(
         "name: s\nunits: {a: {fmu: a.fmu}, b: {fmu: a.fmu}}\nconnect_by_name: false\nrun: {stop_ms: 5}\n"
     )
@@ -392,7 +379,7 @@ def _declared3() -> str:
 
 def _run3(folder: Path, connections: list[str], *sets: str, early: bool = False) -> list[dict[str, str]]:
     for unit in "ab":
-        _builder.build_box3(folder / f"{unit}.fmu", _declared3(), early)
+        build_box.build_box3(folder / f"{unit}.fmu", _declared3(), early)
     (folder / "s.yaml").write_text(
         "name: s\nunits: {a: {fmu: a.fmu}, b: {fmu: b.fmu}}\nconnect_by_name: false\ncoupling: {step_ms: 1000}\n"
         f"run: {{stop_ms: 3000}}\noutput: {{every_ms: 3000}}\nconnections: {json.dumps(connections)}\n"
