@@ -9,6 +9,7 @@ import pytest
 from cardiac_cosim.orchestrator.coupling.acceleration import Acceleration, Aitken, Anderson, Relaxation
 from cardiac_cosim.orchestrator.coupling.connections import Connection, connect
 from cardiac_cosim.orchestrator.coupling.convergence import Convergence, Criterion
+from cardiac_cosim.orchestrator.coupling.exchange import Inputs
 from cardiac_cosim.orchestrator.coupling.iteration import Iterated, Limits
 from cardiac_cosim.orchestrator.coupling.master import Accepted, Master
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
@@ -345,6 +346,23 @@ def test_initial_values_of_an_iterated_loop_agree(
     explicit = master(_feedthrough(fake, port))
     explicit.initialise()
     assert [float(explicit.exchange.value(unit, name)) for unit, name in (("a", "y"), ("b", "x"))] == [1.0, 1.0]
+
+
+def test_ramps_of_the_first_step_begin_at_the_initial_values_in_every_sweep(fake: Any, port: Any) -> None:
+    # x follows y within the step and y follows x: the end of a ramp moves from sweep to sweep, its begin does not.
+    units = {
+        "a": fake("a", [port("x")], [port("y")], law=lambda given, *_: {"y": 0.5 * given["x"] + 1.0}, ramps=True),
+        "b": fake("b", [port("y")], [port("x")], law=lambda given, *_: {"x": given["y"]}, begins={"x": 0.25}),
+    }
+    connections = connect(units, [])
+    limits = Limits({"b.x": Criterion(absolute=1e-6)}, 50, True)
+    iterated = Iterated(SCHEMES["gauss-seidel"](), units, connections, Relaxation(1.0), limits)
+    time = Timeline.of_fixed_step(1.0, 1.0, 1.0)
+    Master(units, connections, iterated, time, inputs=Inputs(1, linear=True)).run([])
+    ramps = [call[3:] for call in units["a"].calls if call[1] == "ramp"]
+    assert len(ramps) > 5
+    assert {begin for begin, _ in ramps} == {0.25}
+    assert len({end for _, end in ramps}) == len(ramps)
 
 
 def test_outputs_that_follow_only_after_the_initialisation_are_no_agreement(fake: Any, port: Any) -> None:
