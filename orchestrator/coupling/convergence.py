@@ -68,7 +68,9 @@ class Convergence:
     ) -> None:
         self._exact = exact
         self._criteria = {name: criterion for name, criterion in criteria.items() if name not in exact}
-        self._carried = carried
+        self._carried = [name for name in carried if name not in exact and name not in criteria]
+        # Norms of the last values, and the largest of the step.
+        self._norms: dict[str, float] = {}
         self._magnitudes: dict[str, float] = {}
         self.history: list[dict[str, float]] = []
 
@@ -79,29 +81,27 @@ class Convergence:
         for name, value in values.items():
             if name in self._exact:
                 continue
+            self._norms[name] = _norm(value)
             # What it was before the first sweep counts as well: a field on its way to zero has a magnitude.
             before = _norm(value - residuals[name]) if first else 0.0
-            self._magnitudes[name] = max(self._magnitudes.get(name, 0.0), _norm(value), before)
-        return not self.open(values)
+            self._magnitudes[name] = max(self._magnitudes.get(name, 0.0), self._norms[name], before)
+        return not self.open()
 
-    def open(self, values: Mapping[str, Values]) -> list[str]:
+    def open(self) -> list[str]:
         """The fields that do not meet their criterion after the last sweep."""
         last, first = self.history[-1], self.history[0]
         named = {name: self._criteria[name] for name in last if name in self._criteria}
         limits = [criterion.for_others(self._magnitudes[name], first[name]) for name, criterion in named.items()]
         limit = min(limits, default=_LOOSEST)
-        return [
-            name
-            for name, residual in last.items()
-            if (name in self._exact and residual > 0.0)
-            or (name in named and not named[name].met(residual, _norm(values[name]), first[name]))
-            or (
-                name in self._carried
-                and name not in named
-                and name not in self._exact
-                and not residual <= limit * self._magnitudes[name]
-            )
-        ]
+
+        def met(name: str, residual: float) -> bool:
+            if name in named:
+                return named[name].met(residual, self._norms[name], first[name])
+            if name in self._exact:
+                return residual == 0.0
+            return name not in self._carried or residual <= limit * self._magnitudes[name]
+
+        return [name for name, residual in last.items() if not met(name, residual)]
 
     def growth(self, name: str) -> str:
         """In words, since when the residual of a field has not been smaller than it once was; empty if it falls."""
@@ -116,8 +116,7 @@ class Convergence:
         rates = [
             (norm / self.history[0][name]) ** (1.0 / sweeps)
             for name, norm in self.history[-1].items()
-            if sweeps and self.history[0][name] > 0.0 and name not in self._exact
-            if name in self._criteria or name in self._carried
+            if sweeps and self.history[0][name] > 0.0 and (name in self._criteria or name in self._carried)
         ]
         return max(rates, default=None)
 

@@ -112,11 +112,7 @@ class Iterated:
         earlier = {end: exchange.latest(end) for end in _sources(links)}
         complete()
         # There are FMUs whose outputs do not follow their inputs before they leave initialization mode.
-        values = {str(end): exchange.latest(end) for end in earlier}
-        residuals = {
-            str(end): _residual(before, exchange.latest(end), self._is_real(end)) for end, before in earlier.items()
-        }
-        agree = settled.loops[-1].judge(residuals, values)
+        agree = settled.loops[-1].judge(*self._change(earlier, exchange))
         return Sweeps(settled.loops, settled.converged and agree)
 
     def _iterate(self, group: Sequence[str], exchange: Exchange, step: Step, before: Sweeps) -> Sweeps:
@@ -149,24 +145,22 @@ class Iterated:
         for number in range(1, self._limits.max_iterations + 1):
             earlier = {end: exchange.latest(end) for end in interface}
             sweep(number)
-            later = {end: exchange.latest(end) for end in interface}
-            residuals = {str(end): _residual(earlier[end], later[end], self._is_real(end)) for end in interface}
-            values = {str(end): later[end] for end in interface}
+            residuals, values = self._change(earlier, exchange)
             if convergence.judge(residuals, values):
                 return before.with_loop(convergence, True)
             if number == 1:
-                self._rescale({end: later[end] for end in carried})
+                self._rescale({end: values[str(end)] for end in carried})
             if any(residuals[name].any() for name in exact):
                 # After an event the loop is another: nothing that was learned of it holds any more.
                 self._acceleration.forget()
                 continue
             if number < self._limits.max_iterations and carried:
-                following = self._accelerated({end: (earlier[end], later[end]) for end in carried})
+                following = self._accelerated({end: (earlier[end], values[str(end)]) for end in carried})
                 if not all(np.isfinite(value).all() for value in following.values()):
-                    raise self._failure(convergence, values, residuals, before)
+                    raise self._failure(convergence, residuals, before)
                 exchange.overwrite(following)
         if self._limits.fail:
-            raise self._failure(convergence, values, residuals, before)
+            raise self._failure(convergence, residuals, before)
         return before.with_loop(convergence, False)
 
     def memory(self) -> dict[str, Any]:
@@ -208,13 +202,12 @@ class Iterated:
     def _failure(
         self,
         convergence: Convergence,
-        values: Mapping[str, Values],
         residuals: Mapping[str, Values],
         before: Sweeps,
     ) -> NotConverged:
         rate = convergence.contraction_rate
         lines = []
-        for name in convergence.open(values):
+        for name in convergence.open():
             residual = np.atleast_1d(residuals[name])
             where = np.unravel_index(int(np.abs(residual).argmax()), residual.shape)
             lines.append(
@@ -228,6 +221,18 @@ class Iterated:
             before.with_loop(convergence, False),
         )
 
+    def _change(self, earlier: Mapping[End, Values], exchange: Exchange) -> tuple[dict[str, Values], dict[str, Values]]:
+        """By field ("unit.field"), the residual H(x) − x of what was `earlier`, and what it is now.
+
+        Of values that are no real numbers the residual is 1 where they have changed.
+        """
+        residuals, values = {}, {}
+        for end, before in earlier.items():
+            after = exchange.latest(end)
+            values[str(end)] = after
+            residuals[str(end)] = after - before if self._is_real(end) else np.asarray(before != after, dtype=float)
+        return residuals, values
+
     def _is_real(self, end: End) -> bool:
         return self._participants[end.unit].outputs[end.name].is_real
 
@@ -235,11 +240,6 @@ class Iterated:
         unit, _, output = name.partition(".")
         location = self._participants[unit].outputs[output].location
         return location if location in ("node", "element") else "index"
-
-
-def _residual(before: Values, after: Values, is_real: bool) -> Values:
-    """H(x) − x; of values that are no real numbers, 1 where they have changed."""
-    return after - before if is_real else np.asarray(before != after, dtype=float)
 
 
 def _sources(links: Iterable[Connection]) -> list[End]:

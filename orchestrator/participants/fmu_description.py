@@ -21,9 +21,7 @@ from lxml import etree
 from ...fmus.annotations import TOOL
 from ..errors import InputError
 from ..quoting import quoted, shortened
-from .fmu_file import FmuFile
-
-_MEMBER = "modelDescription.xml"
+from .fmu_file import DESCRIPTION, FmuFile
 
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
@@ -144,7 +142,7 @@ def _version(root: Any) -> str:
     version = root.get("fmiVersion")
     if root.tag != "fmiModelDescription" or version is None:
         raise InputError(
-            f"its {_MEMBER} describes no FMU (the root is {shortened(root.tag)}, fmiVersion "
+            f"its {DESCRIPTION} describes no FMU (the root is {shortened(root.tag)}, fmiVersion "
             f"{shortened(version or 'not given')})"
         )
     if version.startswith("1."):
@@ -266,7 +264,7 @@ def _archive(root: Any) -> io.BytesIO:
     """An FMU of nothing but a description."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as archive:
-        archive.writestr(_MEMBER, etree.tostring(root))
+        archive.writestr(DESCRIPTION, etree.tostring(root))
     content.seek(0)
     return content
 

@@ -15,7 +15,8 @@ from ..errors import InputError
 from ..untrusted.archive import LARGEST_MEMBER, open_archive
 from ..untrusted.document import parse_document
 
-_DESCRIPTION = "modelDescription.xml"
+#: What every FMU has.
+DESCRIPTION = "modelDescription.xml"
 
 
 class FmuFile:
@@ -39,17 +40,17 @@ class FmuFile:
     def description(self) -> Any:
         """The root element of its model description."""
         if self._is_folder:
-            path = self._path / _DESCRIPTION
+            path = self._path / DESCRIPTION
             if not path.is_file():
-                raise InputError(f"this folder has no {_DESCRIPTION}, so it is no FMU")
+                raise InputError(f"this folder has no {DESCRIPTION}, so it is no FMU")
             if path.stat().st_size > LARGEST_MEMBER:
-                raise InputError(f"{_DESCRIPTION} has more than {LARGEST_MEMBER} bytes")
+                raise InputError(f"{DESCRIPTION} has more than {LARGEST_MEMBER} bytes")
             content = path.read_bytes()
         else:
             with open_archive(self._path) as archive:
-                if _DESCRIPTION not in archive:
-                    raise InputError(f"this archive has no {_DESCRIPTION}, so it is no FMU")
-                content = archive.read(_DESCRIPTION)
+                if DESCRIPTION not in archive:
+                    raise InputError(f"this archive has no {DESCRIPTION}, so it is no FMU")
+                content = archive.read(DESCRIPTION)
         with _naming_description():
             return parse_document(content)
 
@@ -70,7 +71,7 @@ def _naming_description() -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(f"{_DESCRIPTION}: {error}") from None
+        raise InputError(f"{DESCRIPTION}: {error}") from None
 
 
 def check_binary(file: FmuFile, description: Any) -> None:
