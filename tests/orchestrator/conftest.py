@@ -14,8 +14,10 @@ from cardiac_cosim.orchestrator.coupling.connections import connect
 from cardiac_cosim.orchestrator.coupling.master import Master
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
 from cardiac_cosim.orchestrator.coupling.timeline import Timeline
-from cardiac_cosim.orchestrator.errors import ParticipantError
+from cardiac_cosim.orchestrator.errors import ParticipantError, RunError
 from cardiac_cosim.orchestrator.participants.participant import Abilities, Port, Ports, Ramp, Values, Wait
+from cardiac_cosim.orchestrator.run import run_scenario
+from cardiac_cosim.orchestrator.scenario import Scenario
 
 #: From the inputs, the outputs, begin and size of a step in s to the outputs at its end.
 Law = Callable[..., Mapping[str, Any]]
@@ -179,3 +181,24 @@ def cosim(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -
 def fmu_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the FMUs of a test session are built, once for all tests."""
     return tmp_path_factory.mktemp("fmus")
+
+
+@pytest.fixture
+def stopped(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Run a scenario that fails as soon as it has taken so many steps."""
+
+    def run(steps: int, scenario: Scenario, base: Path, out: Path) -> None:
+        step, taken = Master._take_step, []
+
+        def fails(master: Master) -> Any:
+            if len(taken) == steps:
+                raise RunError("stopped")
+            taken.append(1)
+            return step(master)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Master, "_take_step", fails)
+            with pytest.raises(RunError, match="stopped"):
+                run_scenario(scenario, base, out)
+
+    return run

@@ -1,6 +1,5 @@
 """If these fail, a measured input drives a unit with other values, or at other times, than the file has."""
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,10 +7,10 @@ from typing import Any
 import build_box
 import numpy as np
 import pytest
-from cardiac_cosim.orchestrator.coupling.master import Master
-from cardiac_cosim.orchestrator.errors import InputError, RunError
+from cardiac_cosim.orchestrator.errors import InputError
 from cardiac_cosim.orchestrator.run import run_scenario, show_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from written import rows
 
 needs_compiler = pytest.mark.skipif(build_box.compiler() is None, reason="no C compiler to build foreign FMUs with")
 
@@ -43,11 +42,6 @@ output: {every_ms: 3000}
 Simulate = Callable[..., list[dict[str, str]]]
 
 
-def _rows(folder: Path) -> list[dict[str, str]]:
-    with (folder / "timeseries.csv").open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
 @pytest.fixture
 def simulate(tmp_path: Path) -> Simulate:
     """Run one box for three seconds, driven by the file given; the rows of the time series."""
@@ -58,7 +52,7 @@ def simulate(tmp_path: Path) -> Simulate:
         (tmp_path / "x.csv").write_text(text, encoding="utf-8")
         (tmp_path / "s.yaml").write_text(_SCENARIO)
         run_scenario(load_scenario(tmp_path / "s.yaml", sets), tmp_path, tmp_path / "out")
-        return _rows(tmp_path / "out")
+        return rows(tmp_path / "out")
 
     return run
 
@@ -109,30 +103,17 @@ def test_units_that_wait_see_the_file_over_their_own_steps(simulate: Simulate, e
 
 
 @needs_compiler
-def test_a_driven_run_goes_on_from_a_checkpoint(
-    simulate: Simulate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_driven_run_goes_on_from_a_checkpoint(simulate: Simulate, tmp_path: Path, stopped: Any) -> None:
     whole = simulate(_JUMP, "coupling.interpolation=linear")
     scenario = load_scenario(tmp_path / "s.yaml", ["coupling.interpolation=linear"])
-    step, taken = Master._take_step, []
-
-    def fails(master: Any) -> Any:
-        taken.append(1)
-        if len(taken) == 4:
-            raise RunError("stopped")
-        return step(master)
-
-    monkeypatch.setattr(Master, "_take_step", fails)
-    with pytest.raises(RunError, match="stopped"):
-        run_scenario(scenario, tmp_path, tmp_path / "out")
-    monkeypatch.undo()
+    stopped(3, scenario, tmp_path, tmp_path / "out")
     content = (tmp_path / "x.csv").read_text()
     (tmp_path / "x.csv").write_text(content.replace("10", "11"))
     with pytest.raises(InputError, match=r"x\.csv has changed since"):
         run_scenario(scenario, tmp_path, tmp_path / "out", resume=True)
     (tmp_path / "x.csv").write_text(content)
     run_scenario(scenario, tmp_path, tmp_path / "out", resume=True)
-    assert _rows(tmp_path / "out") == whole
+    assert rows(tmp_path / "out") == whole
 
 
 @needs_compiler
@@ -208,4 +189,4 @@ def test_a_unit_of_our_own_is_driven_alike_directly_and_through_its_fmu(tmp_path
         run_scenario(scenario, tmp_path, tmp_path / kind, fmu_dir=fmu_dir)
         found.append((tmp_path / kind / "timeseries.csv").read_text())
     assert found[0] == found[1]
-    assert float(_rows(tmp_path / "fmu")[-1]["active_stress_mean_kPa"]) > 1.0
+    assert float(rows(tmp_path / "fmu")[-1]["active_stress_mean_kPa"]) > 1.0

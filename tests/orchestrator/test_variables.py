@@ -1,6 +1,5 @@
 """If these fail, a variable of somebody's FMU is lost, or arrives as another value than the FMU gave."""
 
-import csv
 import json
 import re
 import subprocess
@@ -11,10 +10,10 @@ from typing import Any
 
 import build_box
 import pytest
-from cardiac_cosim.orchestrator.coupling.master import Master
 from cardiac_cosim.orchestrator.errors import InputError, RunError
 from cardiac_cosim.orchestrator.run import run_scenario, show_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from written import rows
 
 pytestmark = pytest.mark.skipif(build_box.compiler() is None, reason="no C compiler to build foreign FMUs with")
 
@@ -59,8 +58,7 @@ def simulate(tmp_path: Path) -> Simulate:
             encoding="utf-8",
         )
         run_scenario(load_scenario(tmp_path / "s.yaml", sets), tmp_path, tmp_path / "out")
-        with (tmp_path / "out" / "timeseries.csv").open(newline="", encoding="utf-8") as file:
-            return list(csv.DictReader(file))
+        return rows(tmp_path / "out")
 
     return run
 
@@ -227,27 +225,13 @@ def test_discrete_values_are_held_whatever_is_done_to_others(simulate: Simulate,
     assert float(rows[-1]["b.m"]) == len(rows)
 
 
-def test_a_run_with_texts_goes_on_from_a_checkpoint(
-    simulate: Simulate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_with_texts_goes_on_from_a_checkpoint(simulate: Simulate, tmp_path: Path, stopped: Any) -> None:
     links = "connections: [b.m -> b.n, b.t -> b.s, b.c -> b.b, b.y -> b.u]\n"
     whole = simulate(_ALL, None, links, "run.checkpoint_every=1")
     scenario = load_scenario(tmp_path / "s.yaml", ["run.checkpoint_every=1"])
-    step, taken = Master._take_step, []
-
-    def fails(master: Any) -> Any:
-        taken.append(1)
-        if len(taken) == 3:
-            raise RunError("stopped")
-        return step(master)
-
-    monkeypatch.setattr(Master, "_take_step", fails)
-    with pytest.raises(RunError, match="stopped"):
-        run_scenario(scenario, tmp_path, tmp_path / "out")
-    monkeypatch.undo()
+    stopped(2, scenario, tmp_path, tmp_path / "out")
     run_scenario(scenario, tmp_path, tmp_path / "out", resume=True)
-    with (tmp_path / "out" / "timeseries.csv").open(newline="", encoding="utf-8") as file:
-        assert list(csv.DictReader(file)) == whole
+    assert rows(tmp_path / "out") == whole
 
 
 @pytest.mark.parametrize(
@@ -313,8 +297,7 @@ def test_an_fmu_may_be_a_folder(simulate: Simulate, tmp_path: Path) -> None:
         archive.extractall(tmp_path / "a folder")
     scenario = load_scenario(tmp_path / "s.yaml", ["units.a.fmu=a folder"])
     run_scenario(scenario, tmp_path, tmp_path / "out")
-    with (tmp_path / "out" / "timeseries.csv").open(newline="", encoding="utf-8") as file:
-        assert list(csv.DictReader(file)) == packed
+    assert rows(tmp_path / "out") == packed
     assert (tmp_path / "a folder" / "modelDescription.xml").is_file()
 
 
@@ -385,8 +368,7 @@ def _run3(folder: Path, connections: list[str], *sets: str, early: bool = False)
         f"run: {{stop_ms: 3000}}\noutput: {{every_ms: 3000}}\nconnections: {json.dumps(connections)}\n"
     )
     run_scenario(load_scenario(folder / "s.yaml", sets), folder, folder / "out")
-    with (folder / "out" / "timeseries.csv").open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return rows(folder / "out")
 
 
 def test_all_types_of_fmi_3_are_exchanged_and_recorded(tmp_path: Path) -> None:

@@ -144,14 +144,6 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte data[], size_
     return fmi2OK;
 }
 
-#define NOTHING { return fmi2Error; }
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t n, const fmi2Integer o[],
-                                        fmi2Real x[]) NOTHING
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference u[], size_t n,
-                                        const fmi2ValueReference k[], size_t m, const fmi2Real d[], fmi2Real x[]) NOTHING
-fmi2Status fmi2CancelStep(fmi2Component c) NOTHING
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind k, fmi2Status *x) NOTHING
+#include "unused.h"
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k, fmi2Real *x) NOTHING
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind k, fmi2Integer *x) NOTHING
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind k, fmi2Boolean *x) NOTHING
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind k, fmi2String *x) NOTHING
