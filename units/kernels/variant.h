@@ -1,0 +1,5 @@
+/* What every instruction set has: the kernels, one file a concern. Included by kernels.c, several times. */
+
+#include "vector_math.h"
+#include "solid.h"
+#include "quasi_newton.h"

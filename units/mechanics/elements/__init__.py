@@ -1,0 +1,1 @@
+"""Finite elements of the displacement, one file each."""

@@ -1,0 +1,1 @@
+"""Passive laws: strain energies, one file each."""

@@ -1,0 +1,1 @@
+"""Loads: what deforms the solid, one file each."""

@@ -1,0 +1,1 @@
+"""Solvers of the equilibrium, and the factorisations they stand on."""
