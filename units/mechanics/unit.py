@@ -157,6 +157,7 @@ class Mechanics(Unit):
             "loads": unloaded,
             "factored_displacement": rest,
             "factored_loads": unloaded,
+            "factors_spent": np.zeros(()),
         }
         for load, displacement in _CHANGES:
             undeformed |= {load: unloaded, displacement: rest}
@@ -172,13 +173,14 @@ class Mechanics(Unit):
             [self._weighted(state[load]) for load, _ in _CHANGES],
             [state[displacement] for _, displacement in _CHANGES],
         )
-        factored = Factored(state["factored_displacement"], state["factored_loads"])
+        factored = Factored(state["factored_displacement"], state["factored_loads"], int(state["factors_spent"]))
         solution = self._equilibrium.solve(start, start + foreseen, state["loads"], loads, factored)
         result = {
             "displacement": solution.displacement,
             "loads": loads,
             "factored_displacement": solution.factored.displacement,
             "factored_loads": solution.factored.loads,
+            "factors_spent": np.array(float(solution.factored.spent)),
         }
         names = list(_CHANGES)
         if change.any():

@@ -13,7 +13,7 @@ from .superlu import SuperLU
 from .supernodal import Supernodal
 
 #: Unknowns from which each kind of factors no longer fits where the rest of a heart does.
-_MOST_FACTORISED = {"supernodal": 400_000, "superlu": 100_000}
+MOST_FACTORISED = {"supernodal": 400_000, "superlu": 100_000}
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class LinearSolver:
         if self.linear_solver != "auto":
             return self.linear_solver
         kind = "supernodal" if _installed("rslab") else "superlu"
-        return "multigrid" if unknowns > _MOST_FACTORISED[kind] and _installed("pyamg") else kind
+        return "multigrid" if unknowns > MOST_FACTORISED[kind] and _installed("pyamg") else kind
 
 
 def _installed(package: str) -> bool:

@@ -17,12 +17,14 @@ class NotConverged(Exception):
 class Factored:
     """The deformation whose stiffness is factorised: displacement (nodes, 3) in mm and loads in MPa.
 
-    It belongs to the state of whoever looks for equilibria, so that a step repeated from a saved state, with other
-    factors at hand, gives the same bits.
+    `spent` are the iterations beyond one for every equilibrium, which fresher factors might have spared. It all belongs
+    to the state of whoever looks for equilibria, so that a step repeated from a saved state, with other factors at
+    hand, gives the same bits.
     """
 
     displacement: FloatArray
     loads: FloatArray
+    spent: int = 0
 
     @classmethod
     def here(cls, displacement: FloatArray, loads: FloatArray) -> "Factored":
