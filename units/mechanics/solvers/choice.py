@@ -13,7 +13,7 @@ from .superlu import SuperLU
 from .supernodal import Supernodal
 
 #: Unknowns from which each kind of factors no longer fits where the rest of a heart does.
-MOST_FACTORISED = {"supernodal": 400_000, "superlu": 100_000}
+MOST_FACTORISED = {"supernodal": 500_000, "superlu": 100_000}
 
 
 @dataclass(frozen=True)
