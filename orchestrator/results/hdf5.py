@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
+from h5py import h5d, h5f, h5p, h5s, h5t
 
 from .whole import replacing, write_whole
 
@@ -47,7 +48,7 @@ def reading_sealed(path: Path) -> Iterator[h5py.File]:
     content, digest = whole[:-_SIZE], whole[-_SIZE:]
     if _DIGEST(content).digest() != digest:
         raise DamagedFile(path)
-    with h5py.File(io.BytesIO(content), "r") as file:
+    with h5py.File(h5f.open_file_image(content)) as file:
         yield file
 
 
@@ -62,6 +63,22 @@ def write_streamed(path: Path, fill: Callable[[h5py.File], None]) -> None:
             # What HDF5 made of a file that lost what was written to it does not matter.
             if sink.refusal is not None:
                 raise OSError(sink.refusal.errno, sink.refusal.strerror, str(path))
+
+
+def write_mapping(
+    group: h5py.Group, name: str, space: h5s.SpaceID, file: str, source: str, source_space: h5s.SpaceID
+) -> None:
+    """Add the data set of real numbers `name` to `group`, without data: a window on the data set `source` of `file`.
+
+    The selection of `space` shows that of `source_space`. h5py's own layer takes ten times as long.
+    """
+    properties = h5p.create(h5p.DATASET_CREATE)
+    # A run and its repetition are to be the same file: no data set remembers when it was made.
+    properties.set_obj_track_times(False)
+    properties.set_virtual(space, file.encode(), source.encode(), source_space)
+    links = h5p.create(h5p.LINK_CREATE)
+    links.set_create_intermediate_group(True)
+    h5d.create(group.id, name.encode(), h5t.NATIVE_DOUBLE, space, properties, links)
 
 
 class _Sink:

@@ -1,4 +1,8 @@
-"""A stack of frames as files of their own: each is there whole or not at all, whatever ends the process."""
+"""A stack of frames as files of their own: each is there whole or not at all, whatever ends the process.
+
+Their names are those that HDF5 can count by itself (`series`): a data set that is mapped onto them has as many frames as
+there are files, whenever it is opened, so that nothing has to be written anew for a frame that is added.
+"""
 
 import shutil
 from collections.abc import Iterator, Mapping
@@ -6,14 +10,20 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
+import numpy as np
+from h5py import h5s
 
 from ..participants.participant import Values
 from ..writing import writing
-from .hdf5 import DamagedFile, reading_sealed, write_sealed
+from .hdf5 import DamagedFile, reading_sealed, write_mapping, write_sealed
+
+
+#: The time of a frame beside its fields.
+TIME = "time_ms"
 
 
 class Parts:
-    """The frames so far, `<number>.h5` in `folder`, one data set per field and the time as attribute `time_ms`.
+    """The frames so far, `<number>.h5` in `folder`, one data set per field and the time as `time_ms`, shape (1,).
 
     With `kept` those up to that number are kept from an earlier run; all others are removed. Raises DamagedFile if one
     of them is not what was written.
@@ -24,7 +34,7 @@ class Parts:
         self.times: list[float] = []
         for number in range(kept):
             with self.open(number) as file:
-                self.times.append(float(file.attrs["time_ms"]))
+                self.times.append(float(file[TIME][0]))
         with writing(folder):
             if kept == 0 and folder.exists():
                 shutil.rmtree(folder)
@@ -42,9 +52,9 @@ class Parts:
         """Store a frame."""
 
         def fill(file: h5py.File) -> None:
-            file.attrs["time_ms"] = time_ms
+            file[TIME] = np.array([time_ms])
             for name, array in values.items():
-                file[name] = array
+                file[name] = np.asarray(array, np.float64)
 
         write_sealed(self.path(len(self.times)), fill)
         self.times.append(time_ms)
@@ -61,6 +71,19 @@ class Parts:
             shutil.rmtree(self.folder)
 
 
+def series(group: h5py.Group, name: str, folder: str, source: str, shape: tuple[int, ...]) -> None:
+    """Add the data set `name` to `group`: that of all frames in `folder`, of a field of this `shape` or of the time.
+
+    `folder` is relative to the file of `group`. The data set cannot be read as long as there is no frame.
+    """
+    space = h5s.create_simple((0, *shape), (h5s.UNLIMITED, *shape))
+    rest = len(shape)
+    space.select_hyperslab((0,) * (rest + 1), (h5s.UNLIMITED, *[1] * rest), (1,) * (rest + 1), (1, *shape))
+    # A percent sign begins what HDF5 counts by.
+    names = f"{folder}/%b.h5", source.replace("%", "%%")
+    write_mapping(group, name, space, *names, h5s.create_simple(shape or (1,)))
+
+
 def check_parts(folder: Path, kept: int) -> None:
     """DamagedFile if one of so many frames is not what was written."""
     for number in range(kept):
@@ -69,7 +92,7 @@ def check_parts(folder: Path, kept: int) -> None:
 
 
 def _path(folder: Path, number: int) -> Path:
-    return folder / f"{number:06d}.h5"
+    return folder / f"{number}.h5"
 
 
 @contextmanager
