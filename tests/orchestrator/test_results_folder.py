@@ -268,23 +268,33 @@ def test_a_whole_checkpoint_that_lacks_something_is_refused_before_anything_is_t
     out = tmp_path / "out"
     _interrupted(small_scenario, out, monkeypatch)
     path = out / "checkpoint.h5"
-    good = path.read_bytes()
+    with h5py.File(path) as source:
+        stored = {key: source[key][()] for key in source}
+        stored_format = source.attrs["format"]
+    damages: dict[str, Any] = {"a text": ["<U4", [], 0], "another shape": ["<f8", [3, 0, 2], 0], "a group": {}}
     parts = ("master", "series", "log", "wall", "master/states", "master/tick", "fields/frames", "series/digest")
-    for name in ["origin", "memories", *(f"memories/{part}" for part in parts)]:
-        path.write_bytes(good)
+    for name in ["origin", "index", "values", *parts]:
+        content = dict(stored)
+        if name in content:
+            content[name] = {"missing": None, "a text": "text", "another shape": np.zeros((3, 0, 2))}.get(damage, {})
+        else:
+            index = json.loads(stored["index"])
+            *groups, last = name.split("/")
+            group = index
+            for each in groups:
+                group = group[each]
+            del group[last]
+            if damage != "missing":
+                group[last] = damages[damage]
+            content["index"] = json.dumps(index)
 
-        def fill(file: h5py.File, name: str = name) -> None:
-            with h5py.File(path) as source:
-                for key in source:
-                    source.copy(key, file)
-                file.attrs["format"] = source.attrs["format"]
-            del file[name]
-            if damage == "a text":
-                file[name] = "text"
-            elif damage == "another shape":
-                file[name] = np.zeros((3, 0, 2))
-            elif damage == "a group":
-                file.create_group(name)
+        def fill(file: h5py.File, content: dict[str, Any] = content) -> None:
+            file.attrs["format"] = stored_format
+            for key, value in content.items():
+                if isinstance(value, dict):
+                    file.create_group(key)
+                elif value is not None:
+                    file[key] = value
 
         write_sealed(path, fill)
         before = _bytes(out)
