@@ -44,7 +44,7 @@ class Checkpoint:
     def write(self) -> None:
         """Write a checkpoint of this moment, between two steps."""
         values = bytearray()
-        index = _indexed({name: memory() for name, memory in self._parts.items()}, values)
+        index = _indexed({name: memory() for name, memory in self._parts.items()}, values, {})
 
         def fill(file: h5py.File) -> None:
             file.attrs["format"] = _FORMAT
@@ -100,16 +100,21 @@ def read_checkpoint(folder: Path, origin: Origin) -> Memories | None:
     return memories
 
 
-def _indexed(memory: Mapping[str, Any], values: bytearray) -> dict[str, Any]:
-    """`memory` with type, shape and place in place of its arrays, whose bytes are added to `values`."""
+def _indexed(memory: Mapping[str, Any], values: bytearray, known: dict[int, int]) -> dict[str, Any]:
+    """`memory` with type, shape and place in place of its arrays, whose bytes are added to `values`.
+
+    An array under several names is there once; `known` are the places of all so far by identity.
+    """
     index: dict[str, Any] = {}
     for name, value in memory.items():
         if isinstance(value, Mapping):
-            index[name] = _indexed(value, values)
-        else:
-            array = np.asarray(value)
-            index[name] = [array.dtype.str, array.shape, len(values)]
+            index[name] = _indexed(value, values, known)
+            continue
+        array = np.asarray(value)
+        if array is not value or id(array) not in known:
+            known[id(array)] = len(values)
             values += array.tobytes()
+        index[name] = [array.dtype.str, array.shape, known[id(array)]]
     return index
 
 

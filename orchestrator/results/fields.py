@@ -18,7 +18,8 @@ from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 import h5py
-from h5py import h5s
+import numpy as np
+from h5py import h5d, h5s
 
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
@@ -47,7 +48,8 @@ _CENTERS = {"node": "Node", "element": "Cell"}
 class Fields:
     """Writes a frame at every output time; fields.h5 is complete up to the last one at every moment, fields.xdmf nearly.
 
-    `resumed` is the `memory` of an earlier run in the same folder, after whose frames this one goes on.
+    `resumed` is the `memory` of an earlier run in the same folder, after whose frames this one goes on; the
+    `participants` are initialised then.
     """
 
     def __init__(
@@ -64,7 +66,11 @@ class Fields:
         if resumed is None:
             remove_stale(self._xdmf)
         self._parts = Parts(folder / PARTS, 0 if resumed is None else int(resumed["frames"]))
-        self._fixed: dict[str, Values] = {} if resumed is None else dict(resumed.get("fixed", {}))
+        self._fixed: dict[str, Values] = {}
+        if resumed is not None:
+            # What the units made of the same scenario again; it need not be in every checkpoint.
+            fixed = [(name, unit, port) for name, unit, port in self._named if port.fixed]
+            self._fixed = {name: participants[unit].get(port.name) for name, unit, port in fixed}
         # Whether fields.h5 refers to the frames, and to how many fields.xdmf does.
         self._refers = False
         self._listed = len(self._parts.times)
@@ -88,7 +94,7 @@ class Fields:
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
-        return {"frames": len(self._parts.times), "fixed": self._fixed}
+        return {"frames": len(self._parts.times)}
 
     def close(self) -> None:
         """Gather all frames in fields.h5; the parts stay, to go on from a checkpoint."""
@@ -125,14 +131,19 @@ class Fields:
         file["frames_ms"] = self._parts.times
         count = len(self._parts.times)
         frames = file.create_group("frames")
+        chunked = []
         for name, shape in self._moving():
-            frames.create_dataset(name, (count, *shape), maxshape=(None, *shape), chunks=(1, *shape), dtype="f8")
+            whole = (count, *shape)
+            data = frames.create_dataset(name, whole, maxshape=(None, *shape), chunks=(1, *shape), dtype="f8")
+            chunked.append((name, whole, data.id))
         for frame in range(count):
             view = file.create_group(f"views/{frame}")
             with self._parts.open(frame) as part:
-                for name, shape in self._moving():
-                    frames[name].id.write_direct_chunk((frame, *[0] * len(shape)), part[name][()].tobytes())
-                    _window(view, name, frame, (count, *shape))
+                for name, whole, data in chunked:
+                    chunk = np.empty(whole[1:])
+                    h5d.open(part.id, name.encode()).read(h5s.ALL, h5s.ALL, chunk)
+                    data.write_direct_chunk((frame, *[0] * chunk.ndim), chunk)
+                    _window(view, name, frame, whole)
 
     def _moving(self) -> list[tuple[str, tuple[int, ...]]]:
         return [(name, port.shape) for name, _, port in self._named if not port.fixed]

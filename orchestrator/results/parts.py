@@ -15,7 +15,7 @@ from h5py import h5s
 
 from ..participants.participant import Values
 from ..writing import writing
-from .hdf5 import DamagedFile, reading_sealed, write_mapping, write_sealed
+from .hdf5 import DamagedFile, image, reading_sealed, seal, write_array, write_mapping
 
 
 #: The time of a frame beside its fields.
@@ -32,6 +32,9 @@ class Parts:
     def __init__(self, folder: Path, kept: int = 0) -> None:
         self.folder = folder
         self.times: list[float] = []
+        # All frames are the same file but for the numbers: that of the first one, and where the numbers are.
+        self._image = bytearray()
+        self._places: dict[str, int] = {}
         for number in range(kept):
             with self.open(number) as file:
                 self.times.append(float(file[TIME][0]))
@@ -49,15 +52,23 @@ class Parts:
         return _path(self.folder, number)
 
     def add(self, time_ms: float, values: Mapping[str, Values]) -> None:
-        """Store a frame."""
-
-        def fill(file: h5py.File) -> None:
-            file[TIME] = np.array([time_ms])
-            for name, array in values.items():
-                file[name] = np.asarray(array, np.float64)
-
-        write_sealed(self.path(len(self.times)), fill)
+        """Store a frame of the same fields as every other."""
+        arrays = {TIME: np.array([time_ms])} | {name: np.asarray(array, np.float64) for name, array in values.items()}
+        if not self._image:
+            self._lay_out(arrays)
+        for name, array in arrays.items():
+            content = array.tobytes()
+            self._image[self._places[name] : self._places[name] + len(content)] = content
+        seal(self.path(len(self.times)), self._image)
         self.times.append(time_ms)
+
+    def _lay_out(self, arrays: Mapping[str, Values]) -> None:
+        def fill(file: h5py.File) -> None:
+            for name, array in arrays.items():
+                write_array(file, name, array)
+            self._places = {name: file[name].id.get_offset() for name in arrays}
+
+        self._image = bytearray(image(fill))
 
     @contextmanager
     def open(self, number: int) -> Iterator[h5py.File]:
