@@ -1,7 +1,8 @@
 """A whole run: scenario in, results folder out."""
 
 import time
-from contextlib import ExitStack, nullcontext
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from rich.console import Console
 from .assembly import assemble, called_directly, checked_mesh
 from .errors import InputError, Interrupted, RunError
 from .progress import ProgressBar
+from .results import implementation
 from .results.folder import ResultsFolder
 from .results.origin import Origin
 from .scenario import Scenario
@@ -76,8 +78,7 @@ def _run(
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
         assembly = assemble(stack, scenario, base, mesh, fmu_dir)
-        for text in assembly.warnings:
-            console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
+        _warn(console, assembly.warnings)
         master = assembly.master
         ready = time.perf_counter()
         unready = None
@@ -90,12 +91,17 @@ def _run(
             else:
                 with folder.fitting():
                     master.resume(before["master"])
+            implementations = implementation.implementations(assembly.participants)
         except RunError as error:
             if before is not None:
                 raise InputError(f"{folder.path}: {error}; run without --resume to begin anew") from error
-            unready = error
+            unready, implementations = error, {}
+        if before is not None:
+            with folder.fitting(), _about(folder.path):
+                implementation.check(before["implementation"], implementations)
+        _warn(console, implementation.fallbacks(implementations.values()))
         # Nothing in the folder was touched up to here.
-        recording = folder.record(assembly, before, wall)
+        recording = folder.record(assembly, before, wall, implementations)
         bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
         with recording, bar:
             if unready is not None:
@@ -105,6 +111,20 @@ def _run(
                 recording.keep()
                 raise Interrupted(stop.signal)
     return recording.summary
+
+
+def _warn(console: Console, warnings: Iterable[str]) -> None:
+    for text in warnings:
+        console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def _about(path: Path) -> Iterator[None]:
+    """Put the folder in front of what is wrong with what is in it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _draw(output: Path, console: Console) -> tuple[str, ...]:

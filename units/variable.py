@@ -22,6 +22,7 @@ class Causality(Enum):
     PARAMETER = "parameter"
     INPUT = "input"
     OUTPUT = "output"
+    CALCULATED_PARAMETER = "calculatedParameter"
 
 
 class Location(Enum):

@@ -1,9 +1,9 @@
 """checkpoint.h5: all that a run needs to go on after its process has ended, in whatever way.
 
-The content is nested dictionaries of arrays and numbers. All their bytes are one data set, `values`, and `index` is the
-dictionaries as JSON, with type, shape and place in it for each array: a data set for each would take five times as long.
-The file is written aside and put in place at once, so that there always is a whole one. What it costs does not grow with
-the run: of the other files it keeps how long they were, and a hash.
+The content is nested dictionaries of arrays and numbers. All their bytes are one data set, `values`, and `index` is
+the dictionaries as JSON, with type, shape and place for each array: a data set for each would take five times as long.
+The file is written aside and put in place at once, so that there always is a whole one. What it costs does not grow
+with the run: of the other files it keeps how long they were, and a hash.
 """
 
 import json

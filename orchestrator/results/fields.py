@@ -5,11 +5,11 @@ Layout of the HDF5 file: `points_mm`, `cells`, fixed fields by name (`fiber`, `s
 windows on single frames, without data of their own: what the XDMF file points to, because readers of XDMF disagree
 about hyperslabs (libxdmf3 takes the axes in reverse and shows wrong values without an error).
 
-While a run goes on, the frames lie in `fields.parts/`, a file each, and fields.h5 has the same layout, but for the views,
-with `frames_ms` and `frames/` mapped onto them: an HDF5 file that is being written to is not readable any more when its
-process is killed. It is written once, for HDF5 itself counts the frames that are there; the XDMF file points to them. In
-the end all is copied into fields.h5. Of runs with hundreds of frames fields.xdmf is not written anew for each, which would
-take a time that grows with the square of their number.
+While a run goes on, the frames lie in `fields.parts/`, a file each, and fields.h5 has the same layout, but for the
+views, with `frames_ms` and `frames/` mapped onto them: an HDF5 file that is being written to is not readable any more
+when its process is killed. It is written once, for HDF5 itself counts the frames that are there; the XDMF file points
+to them. In the end all is copied into fields.h5. Of runs with hundreds of frames fields.xdmf is not written anew for
+each, which would take a time that grows with the square of their number.
 """
 
 from collections.abc import Callable, Mapping
@@ -46,7 +46,7 @@ _CENTERS = {"node": "Node", "element": "Cell"}
 
 
 class Fields:
-    """Writes a frame at every output time; fields.h5 is complete up to the last one at every moment, fields.xdmf nearly.
+    """Writes a frame at every output time; fields.h5 is complete up to the last at every moment, fields.xdmf nearly.
 
     `resumed` is the `memory` of an earlier run in the same folder, after whose frames this one goes on; the
     `participants` are initialised then.

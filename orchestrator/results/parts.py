@@ -1,7 +1,7 @@
 """A stack of frames as files of their own: each is there whole or not at all, whatever ends the process.
 
-Their names are those that HDF5 can count by itself (`series`): a data set that is mapped onto them has as many frames as
-there are files, whenever it is opened, so that nothing has to be written anew for a frame that is added.
+Their names are those that HDF5 can count by itself (`series`): a data set that is mapped onto them has as many frames
+as there are files, whenever it is opened, so that nothing has to be written anew for a frame that is added.
 """
 
 import shutil
@@ -16,7 +16,6 @@ from h5py import h5s
 from ..participants.participant import Values
 from ..writing import writing
 from .hdf5 import DamagedFile, image, reading_sealed, seal, write_array, write_mapping
-
 
 #: The time of a frame beside its fields.
 TIME = "time_ms"
