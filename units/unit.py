@@ -93,7 +93,7 @@ class Unit(ABC):
 
     @classmethod
     def variables(cls) -> tuple[Variable, ...]:
-        """Every variable of the unit: parameters, inputs and outputs, the outputs' statistics, what it computes with."""
+        """All of its variables: parameters, inputs and outputs, the outputs' statistics, what it computes with."""
         return tuple(_declared(cls).values())
 
     @classmethod
@@ -237,7 +237,7 @@ class Unit(ABC):
                 return
             self._inputs[name] = field
         else:
-            raise InvalidInput(f"'{name}' is computed by unit '{self.name}' and cannot be set")
+            raise InvalidInput(f"'{name}' is {variable.causality} of unit '{self.name}' and cannot be set")
         self._foreseen = None
 
     def get(self, name: str) -> Any:
@@ -441,7 +441,7 @@ class Unit(ABC):
     def _parameter(self, name: str) -> Variable:
         variable = self.variable(name)
         if variable.causality is not Causality.PARAMETER:
-            raise InvalidInput(f"'{name}' is an {variable.causality.value} of unit '{self.name}', not a parameter")
+            raise InvalidInput(f"'{name}' is {variable.causality} of unit '{self.name}', not a parameter")
         return variable
 
     def _sound(self, state: dict[str, FloatArray]) -> dict[str, FloatArray]:

@@ -24,6 +24,10 @@ class Causality(Enum):
     OUTPUT = "output"
     CALCULATED_PARAMETER = "calculatedParameter"
 
+    def __str__(self) -> str:
+        """For a person, with its article."""
+        return f"{'an' if self.value[0] in 'aeiou' else 'a'} {self.value.replace('P', ' p')}"
+
 
 class Location(Enum):
     """Where on the shared mesh the values of a field sit."""

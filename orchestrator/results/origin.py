@@ -20,7 +20,6 @@ _PACKAGES = (
     "gmsh",
     "h5py",
     "meshio",
-    "networkx",
     "numpy",
     "pyamg",
     "pythonfmu",
