@@ -1,7 +1,7 @@
 """A whole run: scenario in, results folder out."""
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,8 @@ from typing import Any
 from rich.console import Console
 
 from .assembly import assemble, called_directly, checked_mesh
+from .coupling.master import Observer
+from .drawing import Drawing
 from .errors import InputError, Interrupted, RunError
 from .progress import ProgressBar
 from .results import implementation
@@ -57,11 +59,16 @@ def run_scenario(
     """
     started = time.perf_counter()
     console = console or Console(quiet=True)
-    with ResultsFolder(output, Origin.of(scenario, base)) as folder:
+    with ResultsFolder(output, Origin.of(scenario, base)) as folder, ExitStack() as stack:
+        drawing = stack.enter_context(Drawing(output)) if figures else None
         summary = folder.complete() if resume else None
         if summary is None:
-            summary = _run(folder, scenario, base, console, fmu_dir, resume, started)
-        return Outcome(output, summary, _draw(output, console) if figures else ())
+            observers = [] if drawing is None else [drawing]
+            summary = _run(folder, scenario, base, console, fmu_dir, resume, started, observers)
+        if drawing is None:
+            return Outcome(output, summary)
+        with console.status("drawing the figures"):
+            return Outcome(output, summary, drawing.finish())
 
 
 def _run(
@@ -72,6 +79,7 @@ def _run(
     fmu_dir: Path | None,
     resume: bool,
     started: float,
+    observers: Sequence[Observer],
 ) -> dict[str, Any]:
     before = folder.checkpoint() if resume else None
     mesh = checked_mesh(scenario, base)
@@ -106,7 +114,7 @@ def _run(
         with recording, bar:
             if unready is not None:
                 raise unready
-            master.run([recording, bar], stop)
+            master.run([recording, *observers, bar], stop)
             if stop.signal is not None and not master.done:
                 recording.keep()
                 raise Interrupted(stop.signal)
@@ -125,20 +133,6 @@ def _about(path: Path) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def _draw(output: Path, console: Console) -> tuple[str, ...]:
-    """Draw the figures; the warnings of those that cannot be."""
-    # Imported here, so that whoever draws nothing does not wait for the plotting library.
-    from .results.figures import draw_figures
-
-    try:
-        with console.status("drawing the figures"):
-            draw_figures(output)
-    except OSError as error:
-        place = error.filename or output / "figures"
-        return (f"the figures cannot be drawn: {place}: {error.strerror or error}; all other results are complete",)
-    return ()
 
 
 def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -> str:

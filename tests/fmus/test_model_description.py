@@ -11,6 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 from cardiac_cosim.fmus.model_description import model_description
+from cardiac_cosim.units.active_stress import ActiveStress
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.registry import UNITS
 from cardiac_cosim.units.variable import Causality
@@ -155,11 +156,15 @@ def test_parameters_say_what_they_are(unit: str, fmus: dict) -> None:
             assert float(variable.min) == declared[name].at_least
 
 
-def test_a_start_value_keeps_all_its_digits(tiny: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
-    kind = UNITS["active_stress"]
-    potential, *others = kind.fields
-    monkeypatch.setattr(kind, "fields", (replace(potential, start=-100.0 / 3.0), *others))
-    root = etree.fromstring(model_description(kind, tiny, "{0}", "a test").encode())
+def test_a_start_value_keeps_all_its_digits(tiny: Mesh) -> None:
+    potential, *others = ActiveStress.fields
+
+    class Other(ActiveStress):
+        """Another."""
+
+        fields = (replace(potential, start=-100.0 / 3.0), *others)
+
+    root = etree.fromstring(model_description(Other, tiny, "{0}", "a test").encode())
     (start,) = root.xpath("//ScalarVariable[@name='potential[1]']/Real/@start")
     assert float(start) == -100.0 / 3.0
 
