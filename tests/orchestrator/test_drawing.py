@@ -123,7 +123,7 @@ def test_a_process_that_cannot_draw_is_told_of_and_spoils_nothing(tmp_path: Path
 
 def test_a_bug_in_drawing_looks_like_one(tmp_path: Path) -> None:
     (tmp_path / "timeseries.csv").write_text("time_ms,lv_volume_ml\n0.0,no number\n")
-    with Drawing(tmp_path) as drawing, pytest.raises(RuntimeError, match="ValueError: .*no number"):
+    with Drawing(tmp_path) as drawing, pytest.raises(RuntimeError, match=r"ValueError: .*no number"):
         drawing.finish()
 
 

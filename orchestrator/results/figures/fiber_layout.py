@@ -48,7 +48,7 @@ def fiber_layout(run: StoredRun) -> Figure | None:
     extents = [view.extent(np.concatenate([mesh.points, rim])) for view, rim in zip(views, rims, strict=True)]
     half = max(half for _, half in extents)
     figure = Figure(figsize=(10.0, 3.4), layout=ConstrainedLayoutEngine(h_pad=0.08))
-    axes = figure.subplots(1, len(_SCENES), subplot_kw={"projection": "3d"})
+    axes = figure.subplots(1, len(_SCENES))
     for axis, (title, *_), view, (middle, _) in zip(axes, _SCENES, views, extents, strict=True):
         show(axis, view, [body.painted(view)], middle, half)
         axis.set_title(title, fontsize=11)
