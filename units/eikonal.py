@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 
 from .arrays import FloatArray, frozen
 from .directions import FIBER_INPUT, check_directions
-from .electrophysiology.aliev_panfilov import AlievPanfilov
+from .electrophysiology.ionic.aliev_panfilov import AlievPanfilov
 from .electrophysiology.probes import PROBED, Probes
 from .electrophysiology.stimulus import Stimulus
 from .electrophysiology.time_scale import TimeScale
