@@ -1,11 +1,13 @@
 """The direction through the wall and the place in it: a Laplace problem and two wall distances."""
 
+from itertools import chain
+
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, cg, spsolve
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from ..errors import InvalidInput
 from ..mesh import Mesh
 from ..mesh.finite_elements import diffusion_matrices, shape_gradients
@@ -14,8 +16,8 @@ from ..mesh.sparsity import Pattern
 #: Gradient of the wall coordinate, relative to the largest, below which an element counts as having none.
 _FLAT = 1e-10
 
-#: Points whose wall distance is sought at a time, and faces that are looked at first: a bound to the memory.
-_BLOCK, _FIRST_ASKED = 1 << 14, 8
+#: Points whose wall distance is sought at a time, which bounds the memory, and faces that are looked at first.
+_BLOCK, _NEAREST = 1 << 13, 4
 
 
 #: Residual to which w is solved, relative to the right-hand side; what conjugate gradients do not reach in so many
@@ -80,29 +82,36 @@ def _filled_from_neighbours(mesh: Mesh, gradient: FloatArray) -> FloatArray:
 def wall_distance(points: FloatArray, mesh: Mesh, boundaries: tuple[str, ...]) -> FloatArray:
     """Distance in mm of `points`, shape (points, 3), to the nearest place on the faces of `boundaries`.
 
-    Exact for the facetted surface. Candidates come from a tree of face centres, the nearest ones first: a face can only
-    be nearest if its centre is no farther than what was found already plus the largest radius of a face.
+    Exact for the facetted surface. Candidates come from a tree of face centres: a face can only be nearest if its
+    centre is no farther than what the nearest centres' faces gave already, plus its own radius.
     """
     faces = np.concatenate([mesh.boundary(name) for name in boundaries])
     corners = mesh.points[faces]
     centres = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - centres[:, None], axis=2).max()
+    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
     tree, distance = cKDTree(centres), np.full(len(points), np.inf)
     for begin in range(0, len(points), _BLOCK):
-        part = np.arange(begin, min(begin + _BLOCK, len(points)))
-        known, asked = 0, min(_FIRST_ASKED, len(faces))
-        while len(part):
-            reach, found = (values.reshape(len(part), -1) for values in tree.query(points[part], k=asked))
-            # What was known from fewer centres is nearer than the others.
-            candidates = corners[found[:, known:]].reshape(-1, 3, 3)
-            again = np.repeat(points[part], asked - known, axis=0)
-            nearest = _distance_to_triangles(again, candidates).reshape(len(part), -1).min(axis=1)
-            distance[part] = np.minimum(distance[part], nearest)
-            if asked == len(faces):
-                break
-            part = part[reach[:, -1] <= distance[part] + radius]
-            known, asked = asked, min(2 * asked, len(faces))
+        part = slice(begin, begin + _BLOCK)
+        near = tree.query(points[part], k=np.arange(1, min(_NEAREST, len(faces)) + 1))[1]
+        distance[part] = _least_distance(points[part], corners, near.ravel(), np.full(len(near), near.shape[1]))
+        within = tree.query_ball_point(points[part], distance[part] + radii.max(), return_sorted=False)
+        counts = np.fromiter(map(len, within), dtype=np.int64, count=len(within))
+        face = np.fromiter(chain.from_iterable(within), dtype=np.int64, count=counts.sum())
+        which = np.repeat(np.arange(len(counts)), counts)
+        away = np.linalg.norm(points[part][which] - centres[face], axis=1)
+        nearer = away <= distance[part][which] + radii[face]
+        counts = np.bincount(which[nearer], minlength=len(counts))
+        distance[part] = np.minimum(distance[part], _least_distance(points[part], corners, face[nearer], counts))
     return distance
+
+
+def _least_distance(points: FloatArray, corners: FloatArray, face: IntArray, counts: IntArray) -> FloatArray:
+    """The least distance of each point to its candidates, `counts` of them each, one after the other in `face`."""
+    distances = _distance_to_triangles(np.repeat(points, counts, axis=0), corners[face])
+    least = np.full(len(points), np.inf)
+    some = counts > 0
+    least[some] = np.minimum.reduceat(distances, (np.cumsum(counts) - counts)[some])
+    return least
 
 
 def _distance_to_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
