@@ -2,8 +2,9 @@
 
 Each node takes the least time over all paths that cross one element from its opposite face, on which T is linear; the
 least over a face, an edge or a corner has a closed form (Qian, Zhang & Zhao 2007). The elements at the nodes whose time
-has changed are updated at once, until none changes: a band of elements that runs along with the wave. How it fails: obtuse elements see part of the directions only, so that times are too late by a
-few per cent on poor meshes; the error is of first order in the element size.
+has changed are updated at once, until none changes: a band of elements that runs along with the wave. How it fails:
+obtuse elements see part of the directions only, so that times are too late by a few per cent on poor meshes; the error
+is of first order in the element size.
 """
 
 from itertools import combinations

@@ -5,7 +5,11 @@ from itertools import combinations
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from numpy.typing import NDArray
+
 from ..arrays import FloatArray, IntArray
+
+SlotArray = NDArray[np.int32]
 
 #: Elements whose matrices are added up at a time: what NumPy needs beside them is bounded.
 _BLOCK = 1 << 17
@@ -87,7 +91,7 @@ def _different_pairs(dofs: IntArray, size: int) -> IntArray:
     return different[different >= 0]
 
 
-def _slots(dofs: IntArray, size: int, pairs: IntArray, place: IntArray, left_out: int) -> IntArray:
+def _slots(dofs: IntArray, size: int, pairs: IntArray, place: SlotArray, left_out: int) -> SlotArray:
     per_element = dofs.shape[1]
     slots = np.full((len(dofs), per_element, per_element), left_out, dtype=np.int32)
     for one in range(per_element):

@@ -29,7 +29,8 @@ class IonicModel(Protocol):
     def initial(self, phi: FloatArray) -> tuple[FloatArray, ...]:
         """The states of cells at rest of which some are given another potential `phi`, each of the shape of `phi`."""
 
-    def rates(self, phi: FloatArray, *states: FloatArray) -> tuple[FloatArray, ...]:
+    @property
+    def rates(self) -> Rates:
         """The rates of φ and of the states in the model's own time, without diffusion and stretch current."""
 
     @property
