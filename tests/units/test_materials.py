@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from cardiac_cosim.units.mechanics.holzapfel_fiber import HolzapfelFiber
 from cardiac_cosim.units.mechanics.kinematics import Kinematics, cofactors, determinant, voigt
-from cardiac_cosim.units.mechanics.neo_hooke import NeoHooke
+from cardiac_cosim.units.mechanics.laws.holzapfel_fiber import HolzapfelFiber
+from cardiac_cosim.units.mechanics.laws.neo_hooke import NeoHooke
 from scipy.spatial.transform import Rotation
 
 _FIBER = np.array([0.6, -0.48, 0.64])
@@ -22,8 +22,10 @@ _LAWS = {
 def _at(gradient: np.ndarray, fiber: np.ndarray = _FIBER) -> Kinematics:
     gradient = np.asarray(gradient, dtype=float).reshape(-1, 3, 3)
     cauchy_green = gradient.transpose(0, 2, 1) @ gradient
-    structure = np.tile(np.outer(fiber, fiber), (len(gradient), 1, 1))
-    return Kinematics(cauchy_green, np.linalg.inv(cauchy_green), np.log(np.linalg.det(gradient)), structure)
+    sheet = np.cross(fiber, [0.0, 0.0, 1.0])
+    sheet /= np.linalg.norm(sheet)
+    structures = (np.tile(np.outer(axis, axis), (len(gradient), 1, 1)) for axis in (fiber, sheet))
+    return Kinematics(cauchy_green, np.linalg.inv(cauchy_green), np.log(np.linalg.det(gradient)), *structures)
 
 
 def _isochoric_fiber_square(gradient: np.ndarray) -> float:
@@ -182,7 +184,8 @@ def test_kinematics_are_lapacks() -> None:
     np.testing.assert_allclose(ratio, np.linalg.det(gradients), rtol=1e-13)
     expected = ratio[:, None, None] * np.linalg.inv(gradients).transpose(0, 2, 1)
     np.testing.assert_allclose(cofactors(gradients), expected, rtol=1e-12, atol=1e-14)
-    made, exact = Kinematics.of(gradients, ratio, np.tile(np.outer(_FIBER, _FIBER), (8, 1, 1))), _at(gradients)
+    exact = _at(gradients)
+    made = Kinematics.of(gradients, ratio, exact.structure, exact.sheet_structure)
     np.testing.assert_allclose(made.cauchy_green, exact.cauchy_green, rtol=1e-14)
     np.testing.assert_allclose(made.inverse, exact.inverse, rtol=1e-12, atol=1e-13)
     np.testing.assert_allclose(made.log_volume, exact.log_volume, rtol=1e-12)

@@ -40,15 +40,26 @@ def variant() -> str | None:
         return None
     if choice and choice not in names:
         raise InvalidInput(
-            f"the environment variable {CHOICE} is {choice!r}; on this machine it can be: {', '.join((*names, WITHOUT))}"
+            f"the environment variable {CHOICE} is {choice!r}; on this machine it can be: "
+            + ", ".join((*names, WITHOUT))
         )
     return choice or (names[-1] if names else None)
 
 
-def kernel(name: str) -> Kernel | None:
-    """The function `name` of kernels.c in the variant in use; None where NumPy is. It returns a C int."""
-    used = variant()
-    return None if used is None else getattr(_library(), f"{name}_{used}")
+def kernel(name: str, *, integers: int = 0, pointers: int) -> Kernel:
+    """The function `name` in the variant in use, of which there has to be one (`variant`).
+
+    It takes a number of 64-bit integers, then a number of `pointers`, and returns a C int.
+    """
+    function: Any = getattr(_library(), f"{name}_{variant()}")
+    function.argtypes = [ctypes.c_int64] * integers + [ctypes.c_void_p] * pointers
+    return function
+
+
+def law_number(name: str) -> int:
+    """The number by which the kernels know the passive law `name`; -1 if they do not."""
+    library = _library()
+    return -1 if library is None else int(library.law_number(name.encode()))
 
 
 def described() -> str:

@@ -23,7 +23,8 @@ struct strain {
     double inverse[VOIGT][LANES];         /* its inverse */
     double volume_ratio[LANES];           /* J */
     double log_volume[LANES];             /* ln J */
-    double structure[VOIGT][LANES];       /* a0 (x) a0 */
+    double structure[VOIGT][LANES];       /* a0 (x) a0 of the fibre */
+    double sheet_structure[VOIGT][LANES]; /* s0 (x) s0 of the sheet */
 };
 
 struct response {
@@ -32,7 +33,7 @@ struct response {
     double tangent[VOIGT_PAIRS][LANES];   /* 4 d2W/dC2 */
 };
 
-/* Mirrored in mechanics/compiled.py, and to be kept as it is there. */
+/* Mirrored in mechanics/compiled_bulk.py, and to be kept as it is there. */
 struct solid {
     int64_t blocks;
     int64_t element_nodes;                /* 4 or 10 */
@@ -40,6 +41,7 @@ struct solid {
     const double *gradients;              /* [blocks][element_nodes][3][LANES], 1/mm */
     const double *weights;                /* [blocks][LANES], mm3 */
     const double *fiber;                  /* [blocks][3][LANES] */
+    const double *sheet;                  /* [blocks][3][LANES] */
     const double *active;                 /* [blocks][VOIGT][LANES], stress for each unit of active stress */
     const double *vertex_shares;          /* [blocks][4][LANES], how the nodal active stress enters; NULL: a quarter each */
     int64_t laws;
@@ -96,9 +98,12 @@ static inline void VARIANT(deform)(const struct solid *solid, int64_t block, int
         at->volume_ratio[l] = determinant;
         at->log_volume[l] = VARIANT(logarithm)(determinant);
     }
-    const double *fiber = solid->fiber + block * 3 * LANES;
+    const double *fiber = solid->fiber + block * 3 * LANES, *sheet = solid->sheet + block * 3 * LANES;
     for (int c = 0; c < VOIGT; c++)
-        LANE at->structure[c][l] = fiber[VOIGT_ROW[c] * LANES + l] * fiber[VOIGT_COLUMN[c] * LANES + l];
+        LANE {
+            at->structure[c][l] = fiber[VOIGT_ROW[c] * LANES + l] * fiber[VOIGT_COLUMN[c] * LANES + l];
+            at->sheet_structure[c][l] = sheet[VOIGT_ROW[c] * LANES + l] * sheet[VOIGT_COLUMN[c] * LANES + l];
+        }
 }
 
 /* Stress, and energy and tangent where they are wanted, of all laws and of the active stress. */

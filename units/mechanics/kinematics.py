@@ -1,4 +1,4 @@
-"""Deformation of an element and the Voigt notation that the material laws share."""
+"""Deformation at the integration points, and the Voigt notation that the passive laws share."""
 
 from dataclasses import dataclass
 
@@ -41,25 +41,34 @@ def determinant(tensor: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """What the strain energies depend on, for each element.
+    """What the strain energies depend on, for each integration point.
 
-    `cauchy_green` C and its `inverse` have shape (elements, 3, 3), `log_volume` ln J has shape (elements,), and
-    `structure` is a₀⊗a₀, shape (elements, 3, 3). J is positive: whoever builds this has checked.
+    `cauchy_green` C and its `inverse` have shape (points, 3, 3), `log_volume` ln J has shape (points,); `structure` is
+    a₀⊗a₀ of the fibre and `sheet_structure` s₀⊗s₀ of the sheet, both of shape (points, 3, 3). J is positive: whoever
+    builds this has checked.
     """
 
     cauchy_green: FloatArray
     inverse: FloatArray
     log_volume: FloatArray
     structure: FloatArray
+    sheet_structure: FloatArray
 
     @classmethod
-    def of(cls, gradient: FloatArray, volume_ratio: FloatArray, structure: FloatArray) -> "Kinematics":
-        """From the deformation gradient F, shape (elements, 3, 3), and J = det F > 0, shape (elements,)."""
+    def of(
+        cls, gradient: FloatArray, volume_ratio: FloatArray, structure: FloatArray, sheet_structure: FloatArray
+    ) -> "Kinematics":
+        """From the deformation gradient F, shape (points, 3, 3), and J = det F > 0, shape (points,)."""
         cauchy_green = gradient.transpose(0, 2, 1) @ gradient
         inverse = cofactors(cauchy_green) / (volume_ratio**2)[:, None, None]
-        return cls(cauchy_green, inverse, np.log(volume_ratio), structure)
+        return cls(cauchy_green, inverse, np.log(volume_ratio), structure, sheet_structure)
 
     @property
     def fiber_stretch_squared(self) -> FloatArray:
         """I_a = a₀·C a₀, shape (elements,)."""
         return np.asarray(np.einsum("eij,eij->e", self.structure, self.cauchy_green))
+
+
+def square(direction: FloatArray) -> FloatArray:
+    """d⊗d of directions, shape (elements, 3) to (elements, 3, 3)."""
+    return direction[:, :, None] * direction[:, None, :]

@@ -19,10 +19,9 @@ from ..errors import StepFailure
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import parameter
-from .holzapfel_fiber import HolzapfelFiber
 from .kinematics import Kinematics
-from .neo_hooke import NeoHooke
-from .solid import ActiveShares
+from .laws.registry import LAWS, Material
+from .loads.active_stress import ActiveShares
 from .unit import Mechanics
 
 _MPA_PER_KPA = 1e-3
@@ -54,16 +53,19 @@ class LocalMechanics(Unit):
 
     name = "local_mechanics"
     memoryless = True
-    groups = (NeoHooke, HolzapfelFiber, ActiveShares, Hold)
+    groups = (Material, *LAWS, ActiveShares, Hold)
     fields = tuple(replace(variable, depends_on=_FOLLOWS.get(variable.name, ())) for variable in Mechanics.fields)
 
     def prepare(self) -> None:
         """The axes of the material are those of fibre, sheet and normal: their directions in space do not matter."""
-        self._elastic, self._fibers = self.parameters(NeoHooke), self.parameters(HolzapfelFiber)
+        self._laws = [self.parameters(law) for law in self.parameters(Material).laws]
+        self._modulus = max(law.modulus for law in self._laws)
         shares = self.parameters(ActiveShares)
         self._shares = np.array([1.0, shares.active_share_sheet, shares.active_share_normal])
         self._structure = np.zeros((self.mesh.elements, 3, 3))
         self._structure[:, 0, 0] = 1.0
+        self._sheet_structure = np.zeros_like(self._structure)
+        self._sheet_structure[:, 1, 1] = 1.0
         self._free = slice(1 if self.parameters(Hold).hold == "isometric" else 0, 3)
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
@@ -99,13 +101,13 @@ class LocalMechanics(Unit):
 
     def _newton(self, squares: FloatArray, tension: FloatArray) -> FloatArray | None:
         """The squared stretches along fibre, sheet and normal, shape (elements, 3); None without convergence."""
-        free, modulus = self._free, self._elastic.shear_modulus_MPa
+        free, modulus = self._free, self._modulus
         squares = squares.copy()
         for _ in range(_ITERATIONS):
             at = self._at(squares)
             with np.errstate(over="ignore", invalid="ignore"):
-                stress = self._elastic.stress(at) + self._fibers.stress(at)
-                tangent = 0.5 * (self._elastic.tangent(at) + self._fibers.tangent(at))[:, free, free]
+                stress = sum(law.stress(at) for law in self._laws)
+                tangent = 0.5 * np.asarray(sum(law.tangent(at)[:, free, free] for law in self._laws))
             residual = np.einsum("eii->ei", stress) + tension[:, None] * self._shares
             if np.abs(residual[:, free]).max() <= _TOLERANCE * modulus:
                 return squares
@@ -128,4 +130,4 @@ class LocalMechanics(Unit):
         for axis in range(3):
             diagonal[:, axis, axis] = squares[:, axis]
             inverse[:, axis, axis] = 1.0 / squares[:, axis]
-        return Kinematics(diagonal, inverse, 0.5 * np.log(squares).sum(axis=1), self._structure)
+        return Kinematics(diagonal, inverse, 0.5 * np.log(squares).sum(axis=1), self._structure, self._sheet_structure)

@@ -1,156 +1,131 @@
-"""The discretised solid: energy, residual force and tangent of linear tetrahedra under active stress.
+"""The discretised solid: energy, out-of-balance forces and stiffness of tissue under its loads.
 
-The active stress is a second Piola–Kirchhoff stress, fixed while the solid deforms: it has the potential
-½ s_a (a₀·C a₀ + 0.4 s₀·C s₀ + 0.4 n₀·C n₀), so that equilibrium is the minimum of an energy.
+A solid is put together of parts that know nothing of each other: elements (`elements`), passive laws (`laws`), active
+stress and surface loads (`loads`). All have a potential, so that an equilibrium is the minimum of an energy.
+
+What changes from step to step is the vector of loads: the active stress at the mesh's nodes, then a size for every
+variable surface load, all in MPa.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ..arrays import FloatArray, IntArray
-from ..mesh import Mesh
-from ..mesh.finite_elements import shape_gradients
-from ..mesh.sparsity import Pattern
-from ..variable import parameter
-from .kinematics import VOIGT_COLUMNS, VOIGT_ROWS, Kinematics, determinant
-
-
-class StrainEnergy(Protocol):
-    """A hyperelastic law: energy, second Piola–Kirchhoff stress, and tangent in Voigt notation (MPa)."""
-
-    def energy(self, at: Kinematics) -> FloatArray:
-        """W, shape (elements,)."""
-
-    def stress(self, at: Kinematics) -> FloatArray:
-        """S = 2∂W/∂C, shape (elements, 3, 3)."""
-
-    def tangent(self, at: Kinematics) -> FloatArray:
-        """4∂²W/∂C², shape (elements, 6, 6)."""
-
-
-@dataclass(frozen=True)
-class ActiveShares:
-    """How the active stress acts across the fibre (Bakir et al. 2018)."""
-
-    active_share_sheet: float = parameter(0.4, "1", "part of the active stress along the sheet", at_least=0.0)
-    active_share_normal: float = parameter(
-        0.4, "1", "part of the active stress normal to fibre and sheet", at_least=0.0
-    )
-
-    def tensor(self, fiber: FloatArray, sheet: FloatArray) -> FloatArray:
-        """a₀⊗a₀ + share s₀⊗s₀ + share n₀⊗n₀, shape (elements, 3, 3)."""
-        normal = np.cross(fiber, sheet)
-        return _square(fiber) + self.active_share_sheet * _square(sheet) + self.active_share_normal * _square(normal)
-
-
-def _square(direction: FloatArray) -> FloatArray:
-    return direction[:, :, None] * direction[:, None, :]
+from .bulk import NumpyBulk, Tissue
+from .compiled_bulk import bulk
+from .elements.space import Space
+from .kinematics import Kinematics, determinant, square
+from .loads.surface_load import SurfaceLoad
+from .stiffness import Stiffness, StiffnessPattern
 
 
 class Solid:
-    """Linear tetrahedra of one material.
+    """Tissue under loads.
 
     Parameters
     ----------
-    mesh, fiber, sheet:
-        Mesh and directions, shape (elements, 3).
-    laws:
-        Strain energies that add up.
-    active_tensor:
-        Stress per unit of active stress, shape (elements, 3, 3).
-    fixed:
-        Nodes whose displacement is zero.
+    space:
+        The displacement's nodes and elements.
+    tissue:
+        Directions, passive laws and active stress.
+    free:
+        Which degrees of freedom are free, shape (nodes, 3); the others do not move.
+    pressures:
+        Surface loads whose sizes are part of the loads.
+    supports:
+        Surface loads of fixed size, in MPa.
     """
 
     def __init__(
-        self, mesh: Mesh, fiber: FloatArray, laws: Sequence[StrainEnergy], active_tensor: FloatArray, fixed: IntArray
+        self,
+        space: Space,
+        tissue: Tissue,
+        free: np.ndarray,
+        pressures: Sequence[SurfaceLoad] = (),
+        supports: Sequence[tuple[float, SurfaceLoad]] = (),
     ) -> None:
-        self._cells = mesh.cells
-        self._volumes = mesh.volumes
-        self._gradients = shape_gradients(mesh)
-        self._laws = laws
-        self._structure = _square(fiber)
-        self._active = active_tensor
-        self.free = np.ones((mesh.nodes, 3), dtype=bool)
-        self.free[fixed] = False
-        self.unknowns = int(self.free.sum())
-        numbers = np.full((mesh.nodes, 3), -1)
-        numbers[self.free] = np.arange(self.unknowns)
-        dofs = numbers[mesh.cells].reshape(mesh.elements, 12)
-        self._force_slot = np.where(dofs >= 0, dofs, self.unknowns).ravel()
-        self._pattern = Pattern(dofs, self.unknowns)
+        self.space, self.free = space, free
+        self._tissue = tissue
+        self._pressures, self._supports = pressures, supports
+        self._pattern = StiffnessPattern(space.nodes, free)
+        self._bulk = bulk(space, tissue, self._pattern)
+        self._places = np.flatnonzero(free)
+        self._vertices = int(space.nodes[:, :4].max()) + 1
+        self.unknowns = len(self._places)
+        #: How many loads there are: shape (loads,).
+        self.loads = self._vertices + len(pressures)
 
-    def gradient(self, displacement: FloatArray) -> FloatArray:
-        """F = 1 + ∂u/∂X, shape (elements, 3, 3), for nodal displacements in mm, shape (nodes, 3)."""
-        return np.eye(3) + displacement[self._cells].transpose(0, 2, 1) @ self._gradients
+    @property
+    def compiled(self) -> bool:
+        """Whether compiled kernels compute it, and not NumPy."""
+        return not isinstance(self._bulk, NumpyBulk)
+
+    def moved(self, displacement: FloatArray, step: FloatArray) -> FloatArray:
+        """A new displacement, shape (nodes, 3): the free degrees of freedom moved by `step`, shape (unknowns,)."""
+        result = displacement.copy()
+        result.reshape(-1)[self._places] += step
+        return result
 
     def stretch(self, displacement: FloatArray) -> FloatArray:
         """λ = √(a₀·C a₀), shape (elements,)."""
-        gradient = self.gradient(displacement)
-        squared = np.einsum("eij,eij->e", gradient.transpose(0, 2, 1) @ gradient, self._structure)
-        return np.asarray(np.sqrt(squared))
+        return self._bulk.stretch(displacement)
 
     def volume_ratio(self, displacement: FloatArray) -> FloatArray:
-        """J = det F, shape (elements,)."""
-        return determinant(self.gradient(displacement))
+        """J = det F, its smallest value in each element, shape (elements,)."""
+        ratio = determinant(self._numpy.gradient(displacement))
+        return np.asarray(ratio.reshape(len(self.space.nodes), -1).min(axis=1))
 
     def reference_stress(self) -> float:
         """Largest component of the passive stress in the undeformed solid, in MPa; zero for a sound material."""
-        undeformed = np.broadcast_to(np.eye(3), self._structure.shape)
-        at = Kinematics.of(undeformed, np.ones(len(self._cells)), self._structure)
-        return float(np.abs(sum(law.stress(at) for law in self._laws)).max())
+        fiber, sheet = square(self._tissue.fiber), square(self._tissue.sheet)
+        at = Kinematics.of(np.broadcast_to(np.eye(3), fiber.shape), np.ones(len(fiber)), fiber, sheet)
+        return float(np.abs(sum(law.stress(at) for law in self._tissue.laws)).max())
 
-    def energy(self, displacement: FloatArray, tension: FloatArray) -> float:
-        """Total potential energy in N mm; infinite where an element is inverted. `tension` is nodal, in MPa."""
-        return self.energy_and_residual(displacement, tension)[0]
+    def energy(self, displacement: FloatArray, loads: FloatArray) -> float:
+        """Total potential energy in N mm; infinite where an element is inverted."""
+        return self.energy_and_residual(displacement, loads)[0]
 
-    def residual(self, displacement: FloatArray, tension: FloatArray) -> FloatArray:
-        """Out-of-balance force in N at the free degrees of freedom; NaN where an element is inverted."""
-        return self.energy_and_residual(displacement, tension)[1]
+    def residual(self, displacement: FloatArray, loads: FloatArray) -> FloatArray | None:
+        """Out-of-balance force in N at the free degrees of freedom; None where an element is inverted."""
+        found = self._bulk.forces(displacement, loads[: self._vertices], False)
+        return None if found is None else self._reduced(found[1], displacement, loads)
 
-    def energy_and_residual(self, displacement: FloatArray, tension: FloatArray) -> tuple[float, FloatArray]:
-        """Both at once; they share the kinematics."""
-        gradient = self.gradient(displacement)
-        ratio = determinant(gradient)
-        if not ratio.min() > 0.0:
+    def energy_and_residual(self, displacement: FloatArray, loads: FloatArray) -> tuple[float, FloatArray]:
+        """Both at once; they share the kinematics. Infinite and NaN where an element is inverted."""
+        found = self._bulk.forces(displacement, loads[: self._vertices], True)
+        if found is None:
             return np.inf, np.full(self.unknowns, np.nan)
-        at = Kinematics.of(gradient, ratio, self._structure)
-        density = sum(law.energy(at) for law in self._laws)
-        active = 0.5 * self._element_tension(tension) * np.einsum("eij,eij->e", self._active, at.cauchy_green)
-        stress = self._volumes[:, None, None] * self._stress(at, tension)
-        force = self._gradients @ (stress @ gradient.transpose(0, 2, 1))
-        residual = np.bincount(self._force_slot, force.ravel(), self.unknowns + 1)[:-1]
-        return float(self._volumes @ (density + active)), np.asarray(residual, dtype=np.float64)
+        energy = found[0] + sum(size * load.energy(displacement) for size, load in self._on_surfaces(loads))
+        return energy, self._reduced(found[1], displacement, loads)
 
-    def tangent(self, displacement: FloatArray, tension: FloatArray) -> csr_matrix:
+    def tangent(self, displacement: FloatArray, loads: FloatArray) -> Stiffness:
         """Derivative of the residual by the free degrees of freedom, in N/mm. Needs det F > 0."""
-        gradient = self.gradient(displacement)
-        at = Kinematics.of(gradient, determinant(gradient), self._structure)
-        material = sum(law.tangent(at) for law in self._laws)
-        strain = self._strain_operator(gradient)
-        # Contiguous factors make the stack of small products four times as fast.
-        matrices = np.ascontiguousarray(strain.transpose(0, 2, 1)) @ (material @ strain)
-        initial = self._gradients @ self._stress(at, tension) @ self._gradients.transpose(0, 2, 1)
-        blocks = matrices.reshape(-1, 4, 3, 4, 3)
-        for axis in range(3):
-            blocks[:, :, axis, :, axis] += initial
-        return self._pattern.matrix(self._volumes[:, None, None] * matrices)
+        blocks = self._bulk.stiffness(displacement, loads[: self._vertices])
+        for size, load in self._on_surfaces(loads):
+            self._pattern.add(blocks, self._slots_of(load), size * load.stiffness(displacement))
+        return Stiffness(self._pattern, blocks)
 
-    def _stress(self, at: Kinematics, tension: FloatArray) -> FloatArray:
-        passive = sum(law.stress(at) for law in self._laws)
-        return np.asarray(passive + self._element_tension(tension)[:, None, None] * self._active)
+    def _reduced(self, forces: FloatArray, displacement: FloatArray, loads: FloatArray) -> FloatArray:
+        for size, load in self._on_surfaces(loads):
+            forces += size * load.forces(displacement)
+        return forces.reshape(-1)[self._places]
 
-    def _element_tension(self, tension: FloatArray) -> FloatArray:
-        # Exact: the integral of a linear field over an element is the mean of its nodal values times the volume.
-        return np.asarray(tension[self._cells].mean(axis=1))
+    def _on_surfaces(self, loads: FloatArray) -> list[tuple[float, SurfaceLoad]]:
+        """Surface loads that are there, with their sizes; one of size 0 costs nothing."""
+        sized = zip(loads[self._vertices :].tolist(), self._pressures, strict=True)
+        return [*self._supports, *((size, load) for size, load in sized if size)]
 
-    def _strain_operator(self, gradient: FloatArray) -> FloatArray:
-        """B with δE (Voigt, engineering shears) = B δu, shape (elements, 6, 12)."""
-        product = np.einsum("eki,eaj->eijak", gradient, self._gradients)
-        rows = product[:, VOIGT_ROWS, VOIGT_COLUMNS]
-        rows[:, 3:] += product[:, VOIGT_COLUMNS[3:], VOIGT_ROWS[3:]]
-        return np.asarray(rows.reshape(len(gradient), 6, 12))
+    def _slots_of(self, load: SurfaceLoad) -> IntArray:
+        if id(load) not in self._load_slots:
+            self._load_slots[id(load)] = self._pattern.slots_of(load.nodes)
+        return self._load_slots[id(load)]
+
+    @cached_property
+    def _load_slots(self) -> dict[int, IntArray]:
+        return {}
+
+    @cached_property
+    def _numpy(self) -> NumpyBulk:
+        return self._bulk if isinstance(self._bulk, NumpyBulk) else NumpyBulk(self.space, self._tissue, self._pattern)

@@ -1,21 +1,24 @@
-"""The mechanics unit: quasi-static equilibrium of the heart's wall under its active stress.
+"""The mechanics unit: quasi-static equilibrium of the heart's wall under active stress and cavity pressures.
 
     W = ½μ(I₁ − 3) − μ ln J + ½λ_L(ln J)² + W_f,   S = 2∂W/∂C + s_a (a₀⊗a₀ + 0.4 s₀⊗s₀ + 0.4 n₀⊗n₀)
 
-Displacement fixed on `base`, no other load, no inertia; linear elements. Inputs: the active stress at the nodes, and
+Displacement fixed on `base`, no inertia. Inputs: the active stress at the nodes, the pressures in the cavities, and
 once fibre and sheet. Outputs: stretch per element, displacement, the volumes of the cavities, and the apex's uplift.
-Source: model.md, Mechanics.
+Other passive laws are chosen by `material`, quadratic displacements by `element_order`. Source: model.md, Mechanics.
 
 Loose tolerances are dangerous here: resting tissue fires by itself where λ − 1 > 3.3e-5.
 
-How it fails: where no equilibrium is found, not even with the change of active stress cut into 64 load steps, the step
-ends with StepFailure. With the energy as the seed prints it (`neo_hooke_log_sign: seed`) the undeformed tissue is not
+How it fails: where no equilibrium is found, not even with the change of the loads cut into 64 steps, the step ends
+with StepFailure. With the energy as the seed prints it (`neo_hooke_log_sign: seed`) the undeformed tissue is not
 stress-free, so that there is no state to start from: the initialisation ends with StepFailure.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from ..arrays import FloatArray, frozen
+from .. import kernels
+from ..arrays import FloatArray, IntArray, frozen
 from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
 from ..mesh import Mesh
@@ -24,17 +27,30 @@ from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Location, Record, Variable
-from .equilibrium import Convergence, Equilibrium, Factored
-from .holzapfel_fiber import HolzapfelFiber
-from .neo_hooke import NeoHooke
-from .solid import ActiveShares, Solid
+from .bulk import Tissue
+from .elements.registry import Elements
+from .elements.space import Space
+from .laws.neo_hooke import NeoHooke
+from .laws.registry import LAWS, Material
+from .loads.active_stress import ActiveShares
+from .loads.cavity_pressure import CavityPressure
+from .loads.springs import Pericardium, Springs
+from .solid import Solid
+from .solvers.choice import LinearSolver
+from .solvers.equilibrium import Convergence, Equilibrium
+from .solvers.factored import Factored
+from .solvers.predictor import MEMORY, predicted
 
 _MPA_PER_KPA = 1e-3
+_ML_PER_MM3 = 1e-3
 
 #: Stress in the undeformed tissue, relative to its shear modulus, that is rounding.
 _STRESS_FREE = 1e-9
 
-_FOLLOWS_ALL = ("active_stress", "fiber", "sheet")
+#: The cavities' volumes and the pressures in them.
+_PRESSURES = {"lv_volume": "lv_pressure", "rv_volume": "rv_pressure"}
+
+_FOLLOWS_ALL = ("active_stress", *_PRESSURES.values(), "fiber", "sheet")
 
 
 class Mechanics(Unit):
@@ -42,9 +58,13 @@ class Mechanics(Unit):
 
     name = "mechanics"
     memoryless = True
-    groups = (NeoHooke, HolzapfelFiber, ActiveShares, Convergence)
+    groups = (Material, *LAWS, ActiveShares, Pericardium, Elements, Convergence, LinearSolver)
     fields = (
         Variable("active_stress", Causality.INPUT, "kPa", "active stress along the fibre", Location.NODE),
+        *(
+            Variable(name, Causality.INPUT, "kPa", f"pressure in the {side} ventricle's cavity, if there is one")
+            for name, side in (("lv_pressure", "left"), ("rv_pressure", "right"))
+        ),
         FIBER_INPUT,
         SHEET_INPUT,
         Variable(
@@ -77,32 +97,50 @@ class Mechanics(Unit):
             for surfaces in wall_of(mesh).cavities.values():
                 Cavity(mesh, surfaces)
 
+    def implementation(self) -> str:
+        """What computes: kernels and linear solver."""
+        kind = kernels.described() if self._solid.compiled else "NumPy"
+        return f"{kind}; {self._factorisation.name}"
+
+    def fallbacks(self) -> Iterator[str]:
+        """Sentences for a person, where something slow stands in for what is not installed."""
+        yield from kernels.fallback()
+        yield from self.parameters(LinearSolver).fallback()
+
     def prepare(self) -> None:
         """Set up the solid; InvalidInput if directions are no unit vectors or a boundary is missing."""
-        if self.mesh.dimension != 3:
+        mesh = self.mesh
+        if mesh.dimension != 3:
             raise InvalidInput("finite-element mechanics needs tetrahedra; take the unit local_mechanics in this scene")
         fiber, sheet = self._inputs["fiber"], self._inputs["sheet"]
         check_directions("fiber", fiber)
         check_directions("sheet", sheet, normal_to=fiber)
-        elastic = self.parameters(NeoHooke)
+        space = self.parameters(Elements).space(mesh)
+        laws = [self.parameters(law) for law in self.parameters(Material).laws]
+        self._modulus = max(law.modulus for law in laws)
+        surfaces = {
+            name: np.concatenate([mesh.boundary(part) for part in parts])
+            for name, parts in wall_of(mesh).cavities.items()
+        }
+        self._cavities = {name: CavityPressure(space, faces) for name, faces in surfaces.items()}
         self._solid = Solid(
-            self.mesh,
-            fiber,
-            (elastic, self.parameters(HolzapfelFiber)),
-            self.parameters(ActiveShares).tensor(fiber, sheet),
-            self.mesh.boundary_nodes("base"),
+            space,
+            Tissue(fiber, sheet, laws, self.parameters(ActiveShares).tensor(fiber, sheet)),
+            _free(len(space.points), space.face_nodes(mesh.boundary("base"))),
+            list(self._cavities.values()),
+            self._supports(space),
         )
-        element_size = float(self.mesh.volumes.mean()) ** (1.0 / 3.0)
+        self._factorisation = self.parameters(LinearSolver).factorisation(self._solid)
+        element_size = float(mesh.volumes.mean()) ** (1.0 / 3.0)
         self._equilibrium = Equilibrium(
-            self._solid, elastic.shear_modulus_MPa * element_size**2, self.parameters(Convergence)
+            self._solid, self._modulus * element_size**2, self.parameters(Convergence), self._factorisation
         )
-        self._cavities = {name: Cavity(self.mesh, surfaces) for name, surfaces in wall_of(self.mesh).cavities.items()}
-        self._apex = int(self.mesh.points[:, 2].argmin())
+        self._apex = int(mesh.points[:, 2].argmin())
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
-        """The undeformed state, brought to equilibrium with the initial active stress."""
+        """The undeformed state, brought to equilibrium with the initial loads."""
         stress = self._solid.reference_stress()
-        if stress > _STRESS_FREE * self.parameters(NeoHooke).shear_modulus_MPa:
+        if stress > _STRESS_FREE * self._modulus:
             raise StepFailure(
                 f"the undeformed tissue carries a stress of {stress:.3g} MPa although nothing loads it: the strain "
                 "energy has no stress-free state to start from"
@@ -112,42 +150,85 @@ class Mechanics(Unit):
                     else ""
                 )
             )
-        rest = frozen(np.zeros((self.mesh.nodes, 3)))
-        relaxed = frozen(np.zeros(self.mesh.nodes))
+        rest = frozen(np.zeros((len(self._solid.space.points), 3)))
+        unloaded = frozen(np.zeros(self._solid.loads))
         undeformed = {
             "displacement": rest,
-            "velocity": rest,
-            "tension": relaxed,
+            "loads": unloaded,
             "factored_displacement": rest,
-            "factored_tension": relaxed,
+            "factored_loads": unloaded,
+            "factors_spent": np.zeros(()),
         }
+        for load, displacement in _CHANGES:
+            undeformed |= {load: unloaded, displacement: rest}
         return self.advance(undeformed, inputs, inputs, 0.0, 0.0)
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
-        """Equilibrium under the active stress at the end of the step; a memoryless map but for its starting guess."""
-        tension = frozen(_MPA_PER_KPA * inputs["active_stress"])
-        before = state["displacement"]
-        factored = Factored(state["factored_displacement"], state["factored_tension"])
-        guess = before + step * state["velocity"]
-        solution = self._equilibrium.solve(before, guess, state["tension"], tension, factored)
-        velocity = (solution.displacement - before) / step if step > 0.0 else state["velocity"]
-        return {
+        """Equilibrium under the loads at the end of the step; a memoryless map but for its starting guess."""
+        loads, start = self._loads(inputs), state["displacement"]
+        change = loads - state["loads"]
+        # The changes are remembered with their sizes per node, so that a pressure counts as much as all active stress.
+        foreseen = predicted(
+            self._weighted(change),
+            [self._weighted(state[load]) for load, _ in _CHANGES],
+            [state[displacement] for _, displacement in _CHANGES],
+        )
+        factored = Factored(state["factored_displacement"], state["factored_loads"], int(state["factors_spent"]))
+        solution = self._equilibrium.solve(start, start + foreseen, state["loads"], loads, factored)
+        result = {
             "displacement": solution.displacement,
-            "velocity": velocity,
-            "tension": tension,
+            "loads": loads,
             "factored_displacement": solution.factored.displacement,
-            "factored_tension": solution.factored.tension,
+            "factored_loads": solution.factored.loads,
+            "factors_spent": np.array(float(solution.factored.spent)),
         }
+        names = list(_CHANGES)
+        if change.any():
+            result[names[0][0]], result[names[0][1]] = change, solution.displacement - start
+            earlier, later = names[:-1], names[1:]
+        else:
+            # Nothing was learned.
+            earlier, later = names, names
+        for (load, displacement), (to_load, to_displacement) in zip(earlier, later, strict=True):
+            result |= {to_load: state[load], to_displacement: state[displacement]}
+        return result
 
     def output(self, name: str, state: State) -> FloatArray:
         """Stretch (elements,), displacement (nodes, 3) in mm, volumes in ml and uplift in mm (both scalars)."""
         displacement = state["displacement"]
         if name == "displacement":
-            return displacement
+            return displacement[: self.mesh.nodes]
         if name == "stretch":
             return frozen(self._solid.stretch(displacement))
         if name == "apex_uplift":
             return frozen(displacement[self._apex, 2])
         if name not in self._cavities:
             return frozen(0.0)
-        return frozen(self._cavities[name].volume(self.mesh.points + displacement))
+        return frozen(_ML_PER_MM3 * self._cavities[name].volume(displacement))
+
+    def _loads(self, inputs: State) -> FloatArray:
+        """Active stress at the nodes, then the pressures in the cavities, in MPa, shape (loads,)."""
+        pressures = [inputs[_PRESSURES[name]] for name in self._cavities]
+        return frozen(_MPA_PER_KPA * np.concatenate([inputs["active_stress"], *(np.atleast_1d(p) for p in pressures)]))
+
+    def _weighted(self, loads: FloatArray) -> FloatArray:
+        if not self._cavities:
+            return loads
+        weighted = loads.copy()
+        weighted[self.mesh.nodes :] *= np.sqrt(self.mesh.nodes)
+        return weighted
+
+    def _supports(self, space: Space) -> list[tuple[float, Springs]]:
+        stiffness = _MPA_PER_KPA * self.parameters(Pericardium).epicardium_stiffness_kPa_per_mm
+        return [(stiffness, Springs(space, self.mesh.boundary("epicardium")))] if stiffness else []
+
+
+#: The last changes of loads and of displacement in the state, the latest first.
+_CHANGES = tuple((f"load_change_{number}", f"displacement_change_{number}") for number in range(1, MEMORY + 1))
+
+
+def _free(nodes: int, fixed: IntArray) -> np.ndarray:
+    """All degrees of freedom but those of the nodes `fixed`, shape (nodes, 3)."""
+    free = np.ones((nodes, 3), dtype=bool)
+    free[np.unique(fixed)] = False
+    return free

@@ -7,17 +7,20 @@ by which the undeformed tissue carries the stress 2μ and has no equilibrium to 
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..variable import parameter
-from .kinematics import Kinematics, dyad, symmetric_product, voigt
+from ...arrays import FloatArray
+from ...variable import parameter
+from ..kinematics import Kinematics, dyad, symmetric_product, voigt
 
 
 @dataclass(frozen=True)
 class NeoHooke:
     """Lamé parameters of the isotropic part."""
+
+    name: ClassVar[str] = "neo_hooke"
 
     shear_modulus_MPa: float = parameter(0.2, "MPa", "mu, shear modulus", above=0.0)
     lame_lambda_MPa: float = parameter(0.5, "MPa", "lambda_L, first Lame parameter", above=0.0)
@@ -31,6 +34,15 @@ class NeoHooke:
     @property
     def _log_modulus(self) -> float:
         return -self.shear_modulus_MPa if self.neo_hooke_log_sign == "seed" else self.shear_modulus_MPa
+
+    @property
+    def modulus(self) -> float:
+        """See Law."""
+        return self.shear_modulus_MPa
+
+    def constants(self) -> tuple[float, ...]:
+        """See Law."""
+        return self.shear_modulus_MPa, self.lame_lambda_MPa, self._log_modulus
 
     def energy(self, at: Kinematics) -> FloatArray:
         """W in MPa, shape (elements,)."""

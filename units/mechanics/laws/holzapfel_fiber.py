@@ -6,20 +6,32 @@ The stress is continuous where the fibre goes slack, the tangent jumps there fro
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..variable import parameter
-from .kinematics import Kinematics, dyad, symmetric_product, voigt
+from ...arrays import FloatArray
+from ...variable import parameter
+from ..kinematics import Kinematics, dyad, symmetric_product, voigt
 
 
 @dataclass(frozen=True)
 class HolzapfelFiber:
     """Stiffness of the fibres."""
 
+    name: ClassVar[str] = "holzapfel_fiber"
+
     fiber_stiffness_MPa: float = parameter(0.001685, "MPa", "k_1, stiffness of the fibres", at_least=0.0)
     fiber_exponent: float = parameter(15.779, "1", "k_2, stiffening of the fibres", above=0.0)
+
+    @property
+    def modulus(self) -> float:
+        """See Law."""
+        return self.fiber_stiffness_MPa
+
+    def constants(self) -> tuple[float, ...]:
+        """See Law."""
+        return self.fiber_stiffness_MPa, self.fiber_exponent
 
     def energy(self, at: Kinematics) -> FloatArray:
         """W_f in MPa, shape (elements,)."""

@@ -1,0 +1,85 @@
+"""How fast hearts beat, and how that grows with the mesh: writes docs/speed.md's tables and figure (some ten minutes).
+
+Seconds, and how often the same mesh's own undeformed stiffness could be factorised in that time by the same process:
+what survives machines. With `--sizes 8 5` only those meshes are measured, and printed. What was measured is kept in
+history.json, with machine and versions.
+"""
+
+import argparse
+import json
+import platform
+import subprocess
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from ..page import write_between
+from .figure import draw
+from .tables import tables
+
+_ROOT = Path(__file__).parent.parent.parent
+_HISTORY = Path(__file__).parent / "history.json"
+_SIZES, _FINEST = (8.0, 5.0, 3.0, 2.0), 1.0
+#: Where the way of calling the units is compared.
+_BASELINE = 5.0
+
+
+def _measured(*arguments: object) -> dict[str, Any]:
+    command = [sys.executable, "-m", "benchmarks.speed.measure", *map(str, arguments)]
+    print(" ".join(command[3:]), flush=True)
+    done = subprocess.run(command, cwd=_ROOT, check=True, stdout=subprocess.PIPE, text=True)
+    return dict(json.loads(done.stdout.strip().splitlines()[-1]))
+
+
+def _machine() -> dict[str, Any]:
+    cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    models = [line.split(":", 1)[1].strip() for line in cpuinfo if line.startswith("model name")]
+    versions = {}
+    for package in ("numpy", "scipy", "rslab"):
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed"
+    return {
+        "processor": f"{models[0]}, {len(models)} threads" if models else platform.machine(),
+        "python": platform.python_version(),
+        **versions,
+    }
+
+
+def _measure(sizes: list[float]) -> list[dict[str, Any]]:
+    # Built and unpacked once before anything is timed.
+    _measured("heartbeat", _BASELINE, "fmu", 5)
+    found = [_measured("heartbeat", size, "native", 320) for size in sizes]
+    if _BASELINE in sizes:
+        found += [_measured("heartbeat", _BASELINE, kind, 320) for kind in ("fmu", "fmu3")]
+    found += [_measured("solid", size) for size in sizes]
+    fine = [*sizes, _FINEST] if sizes == list(_SIZES) else sizes
+    return found + [_measured("electrophysiology", size, 20) for size in fine]
+
+
+def main() -> None:
+    """See the module."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__)
+    parser.add_argument("--sizes", type=float, nargs="+", default=list(_SIZES), help="sizes of the meshes in mm")
+    sizes: list[float] = parser.parse_args().sizes
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=_ROOT, capture_output=True, text=True)
+    record = {
+        "date": datetime.now(UTC).date().isoformat(),
+        "commit": commit.stdout.strip(),
+        "machine": _machine(),
+        "measured": _measure(sizes),
+    }
+    text = tables(record)
+    print(text)
+    if sizes == list(_SIZES):
+        history = json.loads(_HISTORY.read_text(encoding="utf-8")) if _HISTORY.exists() else []
+        _HISTORY.write_text(json.dumps([*history, record], indent=1) + "\n", encoding="utf-8")
+        write_between(_ROOT / "docs" / "speed.md", "speed", text)
+        draw(record, _ROOT / "docs" / "images" / "speed.png")
+
+
+if __name__ == "__main__":
+    main()

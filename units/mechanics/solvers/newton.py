@@ -1,0 +1,61 @@
+"""Newton's method with a line search: slow, and it gets there from afar."""
+
+import numpy as np
+
+from ...arrays import FloatArray, frozen
+from ..solid import Solid
+from .factored import Factored, Factors, NotConverged, Solution, largest
+
+#: Decrease of energy, relative to the slope, that a step has to bring (Armijo).
+_SUFFICIENT = 1e-4
+#: Halvings of a step before giving up.
+_HALVINGS = 12
+
+
+class Newton:
+    """Equilibria of `solid` to a residual of `limit` N in a number of `iterations` at the most."""
+
+    def __init__(self, solid: Solid, factors: Factors, limit: float, iterations: int) -> None:
+        self._solid, self._factors, self._limit, self._iterations = solid, factors, limit, iterations
+
+    def solve(self, displacement: FloatArray, loads: FloatArray, factored: Factored) -> Solution:
+        """The equilibrium reached from `displacement`, shape (nodes, 3), under `loads`; NotConverged if none is."""
+        energy, residual = self._solid.energy_and_residual(displacement, loads)
+        if not np.isfinite(energy):
+            raise NotConverged("an element is inverted where the iteration starts")
+        for iteration in range(self._iterations + 1):
+            if largest(residual) <= self._limit:
+                return Solution(frozen(displacement), factored)
+            if iteration == self._iterations:
+                break
+            factored = Factored.here(displacement, loads)
+            step = self._factors.at(factored)(-residual)
+            if not np.isfinite(step).all() or step @ residual >= 0.0:
+                raise NotConverged("the tangent stiffness is not positive definite: the solid is unstable there")
+            displacement, energy, residual = self.search(displacement, loads, step, energy, residual)
+        raise NotConverged(
+            f"Newton's method left a residual of {largest(residual):.3g} N (limit {self._limit:.3g} N) after "
+            f"{self._iterations} iterations"
+        )
+
+    def search(
+        self, displacement: FloatArray, loads: FloatArray, step: FloatArray, energy: float, residual: FloatArray
+    ) -> tuple[FloatArray, float, FloatArray]:
+        """A fraction of the Newton step that inverts no element and lowers the energy or the residual."""
+        slope = float(step @ residual)
+        fraction = 1.0
+        for _ in range(_HALVINGS):
+            trial = self._solid.moved(displacement, fraction * step)
+            # A trial that goes much too far overflows; its energy is infinite or NaN, and it is not taken.
+            with np.errstate(over="ignore", invalid="ignore"):
+                trial_energy, trial_residual = self._solid.energy_and_residual(trial, loads)
+                smaller = np.linalg.norm(trial_residual) < 0.5 * np.linalg.norm(residual)
+            # Near the minimum the energy's decrease drowns in rounding; there the residual decides.
+            if smaller or trial_energy <= energy + _SUFFICIENT * fraction * slope:
+                return trial, trial_energy, trial_residual
+            fraction *= 0.5
+        ratio = self._solid.volume_ratio(displacement)
+        raise NotConverged(
+            f"no part of the Newton step lowers the energy (element {int(ratio.argmin())} is compressed most, volume "
+            f"ratio {ratio.min():.3g})"
+        )
