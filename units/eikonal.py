@@ -1,9 +1,9 @@
 """Electrophysiology by arrival times: the eikonal equation says when the wave comes, the cell's pulse follows.
 
 The outputs of the monodomain unit with Aliev–Panfilov cells, for scenes in which only the arrival matters: nothing is
-solved in a step, which may be as long as one likes. Speed of a plane wave: √(c d/(2β_t)) (1 − 2α), the front's closed form for r = 0 (Nagumo;
-model.md, Numbers); its foot before the crossing of the activation potential is that of the same front, and behind it
-runs the Aliev–Panfilov action potential of a single cell.
+solved in a step, which may be as long as one likes. Speed of a plane wave: √(c d/(2β_t)) (1 − 2α), the front's closed
+form for r = 0 (Nagumo; model.md, Numbers); its foot before the crossing of the activation potential is that of the same
+front, and behind it runs the action potential of a single cell.
 
 How it fails: it knows no curvature, so that small stimuli start a wave too early, and no electrotonic currents. The
 stretch has no influence on it, so it has no such input. On coarse meshes its speed is nearer to that of fine ones than

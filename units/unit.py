@@ -75,7 +75,7 @@ class Unit(ABC):
     @classmethod
     def variables(cls) -> tuple[Variable, ...]:
         """Every variable of the unit: parameters first, then inputs and outputs, then the outputs' statistics."""
-        return tuple(_declared(cls.groups, cls.fields).values())
+        return tuple(_declared(cls).values())
 
     @classmethod
     def inputs(cls) -> tuple[Variable, ...]:
@@ -91,7 +91,7 @@ class Unit(ABC):
     def variable(cls, name: str) -> Variable:
         """The variable `name`; InvalidInput if the unit has none."""
         try:
-            return _declared(cls.groups, cls.fields)[name]
+            return _declared(cls)[name]
         except KeyError:
             raise InvalidInput(f"unit '{cls.name}' has no variable '{name}'") from None
 
@@ -411,11 +411,11 @@ class Unit(ABC):
 
 
 @cache
-def _declared(groups: tuple[type, ...], fields: tuple[Variable, ...]) -> dict[str, Variable]:
+def _declared(unit: type[Unit]) -> dict[str, Variable]:
     """All variables by name, in their order; kept, because every `get` and `set` looks one up."""
-    parameters = (variable for group in groups for variable in parameters_of(group))
+    parameters = (variable for group in unit.groups for variable in parameters_of(group))
     declared: dict[str, Variable] = {}
-    for variable in (*parameters, *fields, *statistics(fields)):
+    for variable in (*parameters, *unit.fields, *statistics(unit.fields)):
         if variable.name in declared:
             raise TypeError(f"the variable '{variable.name}' is declared twice")
         declared[variable.name] = variable

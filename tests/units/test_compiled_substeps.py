@@ -15,7 +15,7 @@ from cardiac_cosim.units.electrophysiology.progress import NOT_ACTIVATED, Limits
 from cardiac_cosim.units.electrophysiology.time_scale import TimeScale
 from cardiac_cosim.units.errors import StepFailure
 from cardiac_cosim.units.geometry.registry import build
-from cardiac_cosim.units.kernels import available, kernel, using
+from cardiac_cosim.units.kernels import address, available, kernel, using
 from cardiac_cosim.units.mesh import Mesh
 
 pytestmark = pytest.mark.skipif(not available(), reason="nothing was compiled")
@@ -54,15 +54,10 @@ def test_rates_are_those_of_the_model(name: str, instructions: str) -> None:
     model = IONIC_MODELS[name]()
     values = np.random.default_rng(1).uniform(-0.2, 1.2, (1 + len(model.states), 203))
     rates = np.empty_like(values)
+    constants = np.array(model.constants)
     with using(instructions):
-        function = kernel(name)
-    assert function is not None
-    from ctypes import POINTER, c_double, c_int64
-
-    def address(array: np.ndarray):
-        return array.ctypes.data_as(POINTER(c_double))
-
-    function(c_int64(203), c_int64(203), address(np.array(model.constants)), address(values), address(rates))
+        function = kernel(name, integers=2, pointers=3)
+    function(203, 203, *map(address, (constants, values, rates)))
     np.testing.assert_allclose(rates, np.stack(model.rates(*values)), rtol=1e-12, atol=1e-14)
 
 

@@ -1,14 +1,15 @@
 """The compiled substeps of the monodomain equation (units/kernels/monodomain.h), in the place of `integration`."""
 
 import ctypes
-from ctypes import POINTER, c_double, c_int32, c_int64, c_void_p
+from ctypes import c_double, c_int64, c_void_p
 from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from .. import kernels
 from ..arrays import FloatArray
-from ..kernels import Kernel, kernel
+from ..kernels import Kernel
 from ..mesh.finite_elements import quadrature
 from ..mesh.sparsity import Pattern
 from .ionic.model import IonicModel
@@ -25,9 +26,9 @@ class _Pattern(ctypes.Structure):
 
     _fields_ = (
         ("chunks", c_int64),
-        ("starts", POINTER(c_int32)),
-        ("columns", POINTER(c_int32)),
-        ("diagonal", POINTER(c_int32)),
+        ("starts", c_void_p),
+        ("columns", c_void_p),
+        ("diagonal", c_void_p),
     )
 
 
@@ -42,15 +43,15 @@ class _Monodomain(ctypes.Structure):
         ("points", c_int64),
         ("variables", c_int64),
         ("lumped", c_int64),
-        ("mass", POINTER(c_double)),
-        ("diffusion", POINTER(c_double)),
-        ("node_rate", POINTER(c_double)),
-        ("conductance", POINTER(c_double)),
-        ("slots", POINTER(c_int32)),
-        ("cells", POINTER(c_int32)),
-        ("shapes", POINTER(c_double)),
-        ("point_weights", POINTER(c_double)),
-        ("constants", POINTER(c_double)),
+        ("mass", c_void_p),
+        ("diffusion", c_void_p),
+        ("node_rate", c_void_p),
+        ("conductance", c_void_p),
+        ("slots", c_void_p),
+        ("cells", c_void_p),
+        ("shapes", c_void_p),
+        ("point_weights", c_void_p),
+        ("constants", c_void_p),
         ("rates", c_void_p),
         ("reversal", c_double),
         ("tolerance", c_double),
@@ -108,7 +109,7 @@ class _Chunks:
 class CompiledIntegration:
     """The substeps of `equation` with the cells of `ionic`: by the kernel `advance`, with the model's twin `rates`."""
 
-    def __init__(self, equation: Monodomain, ionic: IonicModel, limits: Limits, advance: Kernel, rates: Kernel) -> None:
+    def __init__(self, equation: Monodomain, ionic: IonicModel, limits: Limits, advance: Kernel, rates: Any) -> None:
         self._limits = limits
         self._function = advance
         self._chunks = chunks = _Chunks(equation.pattern)
@@ -126,17 +127,16 @@ class CompiledIntegration:
             "point_weights": self._weights(equation) if points else np.empty(0),
             "constants": np.array(ionic.constants, dtype=np.float64),
         }
-        self._rates = rates
         self._equation = _Monodomain(
-            _Pattern(chunks.count, *map(_address, (chunks.starts, chunks.columns, chunks.diagonal))),
+            _Pattern(chunks.count, *map(kernels.address, (chunks.starts, chunks.columns, chunks.diagonal))),
             mesh.nodes,
             mesh.elements,
             corners,
             points,
             1 + len(ionic.states),
             equation.lumped,
-            *map(_address, self._arrays.values()),
-            ctypes.cast(rates, c_void_p),  # type: ignore[arg-type]
+            *map(kernels.address, self._arrays.values()),
+            ctypes.cast(rates, c_void_p),
             equation.reversal,
             SOLVER_TOLERANCE,
             SOLVER_ITERATIONS,
@@ -155,17 +155,11 @@ class CompiledIntegration:
         activation_time = progress.activation_time[self._chunks.order]
         report = np.empty(2)
         first, last = np.ascontiguousarray(first), np.ascontiguousarray(last)
+        ratio = substep / progress.substep_ms if progress.substep_ms else 0.0
+        numbers = np.array([time, substep, ratio, NOT_ACTIVATED])
+        arrays = (numbers, first, last, values, increments, activation_time, self._work, report)
         wrong = self._function(
-            ctypes.byref(self._equation),
-            _address(first),
-            _address(last),
-            c_int64(np.array_equal(first, last)),
-            c_double(time),
-            c_double(substep),
-            c_int64(count),
-            c_double(substep / progress.substep_ms if progress.substep_ms else 0.0),
-            c_double(NOT_ACTIVATED),
-            *map(_address, (values, increments, activation_time, self._work, report)),
+            count, np.array_equal(first, last), ctypes.addressof(self._equation), *map(kernels.address, arrays)
         )
         if wrong == _UNSOLVED:
             raise unsolved()
@@ -184,14 +178,8 @@ class CompiledIntegration:
 
 def compiled(equation: Monodomain, ionic: IonicModel, limits: Limits) -> CompiledIntegration | None:
     """The compiled substeps; None where there are no kernels, or none for the ionic model."""
-    advance = kernel("monodomain_advance")
-    if advance is None or ionic.kernel is None:
+    if kernels.variant() is None or ionic.kernel is None:
         return None
-    rates = kernel(ionic.kernel)
-    assert rates is not None
+    advance = kernels.kernel("monodomain_advance", integers=2, pointers=9)
+    rates = kernels.kernel(ionic.kernel, integers=2, pointers=3)
     return CompiledIntegration(equation, ionic, limits, advance, rates)
-
-
-def _address(array: np.ndarray) -> Any:
-    kind = c_int32 if array.dtype == np.int32 else c_double
-    return array.ctypes.data_as(POINTER(kind))

@@ -25,11 +25,11 @@ from math import ceil
 
 import numpy as np
 
+from .. import kernels
 from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
 from ..input_ramp import InputRamp
-from ..kernels import described
 from ..mesh.refinement import refined
 from ..snapshot import State
 from ..unit import Unit
@@ -128,7 +128,11 @@ class Electrophysiology(Unit):
 
     def implementation(self) -> str:
         """What computes the steps, for a person: the compiled kernels and their instructions, or NumPy."""
-        return described() if isinstance(self._integration, CompiledIntegration) else "NumPy"
+        return kernels.described() if isinstance(self._integration, CompiledIntegration) else "NumPy"
+
+    def fallbacks(self) -> Iterator[str]:
+        """Sentences for a person, where something slow stands in for what is not installed."""
+        yield from kernels.fallback()
 
     def prepare(self) -> None:
         """Assemble mass and diffusion; InvalidInput if fibres, time scale or substep make no sense."""

@@ -151,15 +151,18 @@ static int VARIANT(judged)(const struct monodomain *equation, const double *phi,
     return fabs(phi[largest]) <= equation->largest_phi ? DONE : TOO_LARGE;
 }
 
-/* `count` substeps of `substep` ms from `time`; `first` and `last` are the stretches of the elements at the begin and the
-   end, `held` says that they are the same. Changed in place: values [variables][size], increments [4][size] (see
-   integration.py), activation [nodes]. `ratio` is that of this substep to the one of which the increments are. `work`
-   has 2 entries + (4 variables + 7) size numbers. Returns 0, or what went wrong, with the details in `report`. */
-EXPORT int VARIANT(monodomain_advance)(const struct monodomain *equation, const double *first, const double *last, int64_t held,
-                                       double time, double substep, int64_t count, double ratio, double not_activated,
-                                       double *restrict values, double *restrict increments, double *restrict activation,
-                                       double *work, double *report)
+/* `count` substeps; `first` and `last` are the stretches of the elements at the begin and the end, `held` says that they are
+   the same. `numbers` are the time and the length of a substep in ms, its ratio to the one of which the increments are,
+   and the activation time of nodes without one. Changed in place: values [variables][size], increments [4][size] (see
+   integration.py), activation [nodes]. `work` has 2 entries + (4 variables + 7) size numbers. Returns 0, or what went
+   wrong, with the details in `report`. */
+EXPORT int VARIANT(monodomain_advance)(int64_t count, int64_t held, const struct monodomain *equation, const double *numbers,
+                                       const double *first, const double *last, double *restrict values,
+                                       double *restrict increments, double *restrict activation, double *work,
+                                       double *report)
 {
+    const double time = numbers[0], substep = numbers[1], not_activated = numbers[3];
+    double ratio = numbers[2];
     const struct pattern *pattern = &equation->pattern;
     const int64_t size = pattern->chunks * ROWS, variables = equation->variables;
     const int64_t entries = pattern->starts[pattern->chunks];

@@ -3,9 +3,8 @@
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import csr_matrix
-
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from ..arrays import FloatArray, IntArray
 
