@@ -1,9 +1,9 @@
 """Electrophysiology by arrival times: the eikonal equation says when the wave comes, the cell's pulse follows.
 
-The outputs of the monodomain unit, for scenes in which only the arrival matters: nothing is solved in a step, which
-may be as long as one likes. Speed of a plane wave: √(c d/(2β_t)) (1 − 2α), the front's closed form for r = 0 (Nagumo;
-model.md, Numbers); its foot before the crossing of the activation potential is that of the same front, and behind it
-runs the Aliev–Panfilov action potential of a single cell.
+The outputs of the monodomain unit with Aliev–Panfilov cells, for scenes in which only the arrival matters: nothing is
+solved in a step, which may be as long as one likes. Speed of a plane wave: √(c d/(2β_t)) (1 − 2α), the front's closed
+form for r = 0 (Nagumo; model.md, Numbers); its foot before the crossing of the activation potential is that of the same
+front, and behind it runs the action potential of a single cell.
 
 How it fails: it knows no curvature, so that small stimuli start a wave too early, and no electrotonic currents. The
 stretch has no influence on it, so it has no such input. On coarse meshes its speed is nearer to that of fine ones than
@@ -21,11 +21,12 @@ from scipy.integrate import solve_ivp
 
 from .arrays import FloatArray, frozen
 from .directions import FIBER_INPUT, check_directions
-from .electrophysiology.aliev_panfilov import AlievPanfilov
+from .electrophysiology.ionic.aliev_panfilov import AlievPanfilov
 from .electrophysiology.probes import PROBED, Probes
+from .electrophysiology.progress import NOT_ACTIVATED
 from .electrophysiology.stimulus import Stimulus
 from .electrophysiology.time_scale import TimeScale
-from .electrophysiology.unit import NOT_ACTIVATED, Electrophysiology, PotentialScale
+from .electrophysiology.unit import Electrophysiology, PotentialScale
 from .errors import InvalidInput
 from .mesh.arrival_times import arrival_times
 from .snapshot import State

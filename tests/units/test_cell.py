@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from cardiac_cosim.units.electrophysiology import Electrophysiology
-from cardiac_cosim.units.electrophysiology.aliev_panfilov import AlievPanfilov
+from cardiac_cosim.units.electrophysiology.integration import stepper
+from cardiac_cosim.units.electrophysiology.ionic.aliev_panfilov import AlievPanfilov
 from cardiac_cosim.units.electrophysiology.monodomain import Conduction, Monodomain
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.snapshot import Snapshot
@@ -86,7 +87,8 @@ def _tissue_course(unit: Electrophysiology, every_ms: float, until: float) -> tu
     for number in range(count + 1):
         state = unit.get_state().state
         for name in ("phi", "recovery"):
-            assert np.ptp(state[name]) < 1e-8, name
+            # Linear systems are solved to a residual of 1e-9.
+            assert np.ptp(state[name]) < 1e-7, name
         course.append((state["phi"].mean(), state["recovery"].mean()))
         unit.do_step(1e-3 * every_ms * number, 1e-3 * every_ms)
     return np.arange(count + 1) * every_ms / _SCALE_MS, np.array(course).T
@@ -198,14 +200,14 @@ def test_stability_limit_of_the_step_from_both_sides(variant: str, grain, along)
     monodomain = Monodomain(grain, fiber, np.ones_like, Conduction(**_VARIANTS[variant]))
 
     def distance(step: float, until: float) -> float:
-        advance = monodomain.stepper(still, step, _NO_RECOVERY.rates)
-        phi, recovery = np.full(grain.nodes, 1.0 - 1e-6), np.zeros(grain.nodes)
+        advance = stepper(monodomain, still, step, _NO_RECOVERY.rates)
+        values = np.stack([np.full(grain.nodes, 1.0 - 1e-6), np.zeros(grain.nodes)])
         for _ in range(round(until / step)):
-            phi, recovery = advance(phi, recovery)
-        return float(np.abs(phi - 1.0).max())
+            values, _ = advance(values, np.zeros((2, grain.nodes)))
+        return float(np.abs(values[0] - 1.0).max())
 
-    # 1e-11: the residual to which the linear systems are solved.
-    assert distance(0.97 * limit, 200.0) < 1e-11
+    # The linear systems are solved to a residual of 1e-9.
+    assert distance(0.97 * limit, 200.0) < 3e-9
     assert distance(1.03 * limit, 50.0) > 1e-5
 
 
@@ -237,7 +239,7 @@ def test_nodes_without_diffusion_advance_by_themselves_each_with_its_time_scale(
         alone = end(time_scale_ms=scale, time_scale_reduction=0.0)
         here = heights == height
         assert here.sum() == 4
-        np.testing.assert_allclose(together[here], alone[here], rtol=0.0, atol=1e-7)
+        np.testing.assert_allclose(together[here], alone[here], rtol=0.0, atol=1e-5)
         assert (np.abs(together[~here] - alone[~here]) > 1e-2).any()
 
 

@@ -11,7 +11,7 @@ from cardiac_cosim.units.geometry import registry
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.mesh.faces import row_keys
 from cardiac_cosim.units.mesh.file import read_mesh, write_mesh
-from cardiac_cosim.units.mesh.finite_elements import interpolation, linear_basis
+from cardiac_cosim.units.mesh.finite_elements import interpolation
 from cardiac_cosim.units.mesh.quality import signed_inverse_condition_number
 
 # Two tetrahedra on either side of the triangle 1, 2, 3.
@@ -234,7 +234,7 @@ def test_quality_is_gmshs(pressed_to: float, smallest: float, largest: float) ->
 
 
 def test_interpolation_reproduces_linear_functions_at_points_inside_their_elements(heart) -> None:
-    to_points, weights = interpolation(linear_basis(heart))
+    to_points, weights = interpolation(heart)
     assert to_points.shape == (len(weights), heart.nodes) == (4 * heart.elements, heart.nodes)
     np.testing.assert_allclose(to_points @ np.ones(heart.nodes), 1.0, rtol=1e-14)
     # The rule of degree 2 by hand: barycentric 0.585…, 0.138… (three times), in whatever order.
@@ -251,7 +251,7 @@ def test_interpolation_reproduces_linear_functions_at_points_inside_their_elemen
 
 
 def test_weights_of_interpolation_are_the_volumes(heart) -> None:
-    _, weights = interpolation(linear_basis(heart))
+    _, weights = interpolation(heart)
     assert (weights > 0.0).all()
     assert weights.sum() == pytest.approx(heart.volumes.sum(), rel=1e-13)
     np.testing.assert_allclose(weights.reshape(heart.elements, 4).sum(axis=1), heart.volumes, rtol=1e-11)
@@ -259,7 +259,7 @@ def test_weights_of_interpolation_are_the_volumes(heart) -> None:
 
 def test_interpolation_integrates_quadratics_exactly(box) -> None:
     mesh = box([0.0, 1.0, 2.5], [0.0, 2.0], [-3.0, -1.0, 0.0])
-    to_points, weights = interpolation(linear_basis(mesh))
+    to_points, weights = interpolation(mesh)
     x, y, z = (to_points @ mesh.points).T
     for integrand, exact in ((x * x, 2.5**3 / 3 * 6.0), (x * y, 3.125 * 2.0 * 3.0), (y * z, 2.5 * 2.0 * -4.5)):
         assert weights @ integrand == pytest.approx(exact, rel=1e-13)

@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from cardiac_cosim.units.electrophysiology import Electrophysiology
-from cardiac_cosim.units.electrophysiology.aliev_panfilov import AlievPanfilov
-from cardiac_cosim.units.electrophysiology.monodomain import MonodomainStep
+from cardiac_cosim.units.electrophysiology.integration import MonodomainStep
+from cardiac_cosim.units.electrophysiology.ionic.aliev_panfilov import AlievPanfilov
 from scipy.integrate import solve_ivp
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.sparse import coo_matrix, csr_matrix, diags_array, identity
@@ -97,6 +97,7 @@ def _grid_speed(size: float, variant: str, recovery: bool = False) -> float:
     grid, step = _Grid(size, variant), 0.1
     equation = SimpleNamespace(
         mass=grid.mass,
+        nodal=variant != "quadrature",
         to_points=grid.to_points,
         load=grid.load,
         point_rate=1.0 / _SCALE_MS,
@@ -104,11 +105,11 @@ def _grid_speed(size: float, variant: str, recovery: bool = False) -> float:
     )
     cell = AlievPanfilov() if recovery else AlievPanfilov(recovery_rate=0.0, recovery_mu1=0.0)
     advance = MonodomainStep(equation, grid.stiffness, np.zeros(grid.nodes), step, cell.rates)
-    phi, rest, times = grid.start, np.zeros(grid.nodes), np.full(grid.nodes, -1.0)
+    values, times = np.stack([grid.start, np.zeros(grid.nodes)]), np.full(grid.nodes, -1.0)
     for number in range(round(grid.until / step)):
-        before = phi
-        phi, rest = advance(phi, rest)
-        _first_crossings(before, phi, step * number, step, times)
+        before = values[0]
+        values, _ = advance(values, np.zeros((2, grid.nodes)))
+        _first_crossings(before, values[0], step * number, step, times)
     return grid.speed(times)
 
 

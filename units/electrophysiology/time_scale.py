@@ -19,6 +19,10 @@ class TimeScale:
     The expected activation time t_a is linear in Z. `last_first` grows from the base to the apex, so that the last to
     depolarise is the first to repolarise, as observed. `seed` is the printed t_a = t_apex (1 − Z/Z_apex), by which
     the base repolarises first: it runs and contradicts the text around it.
+
+    An ionic model of dimensionless time takes β_t as its unit of time. One whose time constants are in ms has them as
+    given where t_a = t₀, and elsewhere multiplied by β_t/β: `time_scale_reduction: 0` gives them everywhere. The
+    stretch-activated current has the rate 1/β_t with every model.
     """
 
     time_scale_ms: float = parameter(12.9, "ms", "beta, time scale at t_a = t_0", above=0.0)
@@ -38,6 +42,10 @@ class TimeScale:
         """See Placed; without a reduction no place matters."""
         if self.time_scale_reduction:
             yield from apex_warnings(mesh, self.apex_z_mm)
+
+    def relative(self, z: FloatArray) -> FloatArray:
+        """β_t over `time_scale_ms`: the clock of an ionic model whose time constants are in ms."""
+        return self(z) / self.time_scale_ms
 
     def __call__(self, z: FloatArray) -> FloatArray:
         """β_t in ms at the heights `z` in mm; InvalidInput where it is not positive."""

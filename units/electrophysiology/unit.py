@@ -1,6 +1,9 @@
-"""The electrophysiology unit: the monodomain equation with Aliev–Panfilov kinetics in the material frame.
+"""The electrophysiology unit: the monodomain equation in the material frame, with one of several ionic models.
 
     ∂Φ/∂t = ∇·(D∇Φ) − (β_φ/β_t)(Ĩ_e + Ĩ_m),   zero flux,   Ĩ_m = G_s max(λ − 1, 0)(φ − φ_s)
+
+Ĩ_e is that of the parameter `ionic_model` (`ionic`). The unit's state has φ, the model's states under their names, the
+activation times, and the last increments of φ, from which the solver guesses the next ones.
 
 Inputs: the stretch λ of the elements, held over a step or ramped (then each substep sees it as it is in its middle),
 and once the fibre directions. Outputs: the transmembrane potential and the activation time at the nodes, and the
@@ -9,17 +12,20 @@ potential at three probes. Source: model.md, Electrophysiology.
 With `refine` the unit solves on a nested refinement of the scene's mesh: fibre and stretch are those of the element
 that a part lies in, potential and activation time are given at the scene's nodes.
 
-Linear elements; an implicit-explicit Runge–Kutta method of second order over substeps of equal length (`monodomain`).
+Linear elements; an implicit-explicit Runge–Kutta method of second order over substeps of equal length (`integration`),
+compiled where it can be (`compiled`).
 
 How it fails: an element coarser than the wave front (≈ 8 mm) gives wrong speeds; a potential that is not finite any
 more, or a linear system that is not solved, ends the step with StepFailure.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
+from .. import kernels
 from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
@@ -27,21 +33,19 @@ from ..input_ramp import InputRamp
 from ..mesh.refinement import refined
 from ..snapshot import State
 from ..unit import Unit
-from ..variable import VOLTAGE, Causality, Location, Record, Variable, parameter
-from .aliev_panfilov import AlievPanfilov
+from ..variable import VOLTAGE, Causality, Location, Record, Variable, parameter, parameters_of
+from .compiled import CompiledIntegration, compiled
+from .integration import Integration
+from .ionic.model import IonicModel
+from .ionic.registry import IONIC_MODELS, IonicChoice
 from .monodomain import Conduction, Monodomain
 from .probes import PROBED, Probes, probe_outputs
+from .progress import NOT_ACTIVATED, Limits, Progress
 from .stimulus import Stimulus
 from .time_scale import TimeScale
 
-#: Activation time of a node that no wave has reached yet.
-NOT_ACTIVATED = -1.0
-
 #: Substeps of a communication step, and elements and levels of a refinement, that nobody would wait for.
-_MOST_SUBSTEPS, _MOST_ELEMENTS, _MOST_LEVELS = 100_000, 1_000_000, 25
-
-#: Dimensionless potential of which nothing is left but numbers; that of cells lies between 0 and 1.
-_LARGEST_PHI = 100.0
+_MOST_SUBSTEPS, _MOST_ELEMENTS, _MOST_LEVELS = 100_000, 8_000_000, 25
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,17 @@ class Electrophysiology(Unit):
     """Monodomain with stretch-activated current on linear elements."""
 
     name = "electrophysiology"
-    groups = (PotentialScale, Resolution, AlievPanfilov, Conduction, TimeScale, Stimulus, Probes, InputRamp)
+    groups = (
+        PotentialScale,
+        Resolution,
+        IonicChoice,
+        *IONIC_MODELS.values(),
+        Conduction,
+        TimeScale,
+        Stimulus,
+        Probes,
+        InputRamp,
+    )
     fields = (
         Variable(
             "stretch",
@@ -103,15 +117,33 @@ class Electrophysiology(Unit):
         *probe_outputs(depends_on=("stretch", "fiber")),
     )
 
+    def warnings(self) -> Iterator[str]:
+        """As for every unit, and parameters of ionic models that are not chosen."""
+        yield from super().warnings()
+        chosen = self.parameters(IonicChoice).ionic_model
+        for name, model in IONIC_MODELS.items():
+            changed = [item.name for item in parameters_of(model) if self.get(item.name) != item.start]
+            if name != chosen and changed:
+                yield f"{', '.join(changed)}: of the ionic model {name}, which is not chosen (ionic_model: {chosen})"
+
+    def implementation(self) -> str:
+        """What computes the steps, for a person: the compiled kernels and their instructions, or NumPy."""
+        return kernels.described() if isinstance(self._integration, CompiledIntegration) else "NumPy"
+
+    def fallbacks(self) -> Iterator[str]:
+        """Sentences for a person, where something slow stands in for what is not installed."""
+        yield from kernels.fallback()
+
     def prepare(self) -> None:
         """Assemble mass and diffusion; InvalidInput if fibres, time scale or substep make no sense."""
         fiber = self._inputs["fiber"]
         check_directions("fiber", fiber)
         self._scale = self.parameters(PotentialScale)
-        self._ionic = self.parameters(AlievPanfilov)
+        self._ionic: IonicModel = self.parameters(IONIC_MODELS[self.parameters(IonicChoice).ionic_model])
         self._resolution = self.parameters(Resolution)
         time_scale = self.parameters(TimeScale)
-        longest = self._ionic.longest_step * float(time_scale(self.mesh.points[:, 2]).min())
+        clock = time_scale if self._ionic.dimensionless_time else time_scale.relative
+        longest = self._ionic.longest_step * float(clock(self.mesh.points[:, 2]).min())
         if self._resolution.longest_substep_ms > longest:
             raise InvalidInput(
                 f"parameter 'longest_substep_ms' is {self._resolution.longest_substep_ms:g}; above {longest:.3g} ms "
@@ -120,7 +152,14 @@ class Electrophysiology(Unit):
         self._probes = self.parameters(Probes).places(self.mesh)
         self._inner = refined(self.mesh, self._checked_levels())
         inherited = fiber[self._inner.parents]
-        self._monodomain = Monodomain(self._inner.mesh, inherited, time_scale, self.parameters(Conduction))
+        equation = Monodomain(self._inner.mesh, inherited, time_scale, self.parameters(Conduction), clock)
+        limits = Limits(
+            (self._scale.activation_potential_mV - self._scale.rest_potential_mV) / self._scale.potential_range_mV,
+            self._ionic.lowest_phi,
+            self._lowest_potential,
+            self._ionic.lowest_phi_reason,
+        )
+        self._integration = compiled(equation, self._ionic, limits) or Integration(equation, self._ionic, limits)
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """Rest, except for the stimulated nodes."""
@@ -134,11 +173,15 @@ class Electrophysiology(Unit):
                 f"{self._lowest_potential:g} mV only"
             )
         already = potential >= self._scale.activation_potential_mV
-        return {
-            "phi": (potential - self._scale.rest_potential_mV) / self._scale.potential_range_mV,
-            "recovery": np.zeros(len(points)),
-            "activation_time": np.where(already, 0.0, NOT_ACTIVATED),
-        }
+        phi = (potential - self._scale.rest_potential_mV) / self._scale.potential_range_mV
+        return self._state_of(
+            Progress(
+                np.stack([phi, *self._ionic.initial(phi)]),
+                np.where(already, 0.0, NOT_ACTIVATED),
+                np.zeros((4, len(points))),
+                0.0,
+            )
+        )
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
         """Equal substeps, in each of which the stretch is held."""
@@ -151,30 +194,14 @@ class Electrophysiology(Unit):
                 f"{self._resolution.longest_substep_ms:g}; take shorter communication steps, or longer substeps"
             )
         substeps = max(1, ceil(count - 1e-9))
-        substep = step / substeps
-        first, last = (values["stretch"][self._inner.parents] for values in (begin, inputs))
-        held = np.array_equal(first, last)
-        stepper = self._monodomain.stepper(last, substep, self._ionic.rates)
-        phi, recovery, activation_time = state["phi"], state["recovery"], state["activation_time"]
-        for number in range(substeps):
-            before = phi
-            if not held:
-                middle = first + (number + 0.5) / substeps * (last - first)
-                stepper = self._monodomain.stepper(middle, substep, self._ionic.rates)
-            phi, recovery = stepper(phi, recovery)
-            if phi.min() <= -self._ionic.recovery_mu2:
-                raise StepFailure(
-                    f"the potential at node {phi.argmin()} fell below {self._lowest_potential:g} mV, the pole of the "
-                    "ionic model's recovery rate; look for degenerate elements there or lower longest_substep_ms"
-                )
-            if not np.abs(phi).max() <= _LARGEST_PHI:
-                node = int(np.abs(phi).argmax())
-                raise StepFailure(
-                    f"the dimensionless potential at node {node} is {phi[node]:.3g}, which no cell reaches; lower "
-                    "longest_substep_ms, or check the parameters of the ionic model"
-                )
-            activation_time = self._activated(activation_time, before, phi, time + number * substep, substep)
-        return {"phi": phi, "recovery": recovery, "activation_time": activation_time}
+        progress = Progress(
+            np.stack([state[name] for name in ("phi", *self._ionic.states)]),
+            state["activation_time"],
+            state["increments"],
+            float(state["substep_ms"]),
+        )
+        first, last = (self._inside(values["stretch"]) for values in (begin, inputs))
+        return self._state_of(self._integration.advance(progress, first, last, time, step / substeps, substeps))
 
     def output(self, name: str, state: State) -> FloatArray:
         """Potential in mV or activation time in ms, shape (nodes,); potential at a probe, a scalar."""
@@ -191,7 +218,7 @@ class Electrophysiology(Unit):
     def _checked_levels(self) -> int:
         levels, dimension = self._resolution.refine, self.mesh.dimension
         elements = self.mesh.elements * 2 ** (dimension * min(levels, _MOST_LEVELS))
-        if dimension and (levels > _MOST_LEVELS or elements > _MOST_ELEMENTS):
+        if dimension and levels and (levels > _MOST_LEVELS or elements > _MOST_ELEMENTS):
             raise InvalidInput(
                 f"parameter 'refine' is {levels}, which makes {elements:.3g} elements or more of {self.mesh.elements}; "
                 f"more than {_MOST_ELEMENTS:.0e} are refused: take fewer levels"
@@ -200,17 +227,16 @@ class Electrophysiology(Unit):
 
     @property
     def _lowest_potential(self) -> float:
-        return self._scale.rest_potential_mV - self._ionic.recovery_mu2 * self._scale.potential_range_mV
+        return self._scale.rest_potential_mV + self._ionic.lowest_phi * self._scale.potential_range_mV
 
-    def _activated(
-        self, earlier: FloatArray, before: FloatArray, after: FloatArray, time: float, substep: float
-    ) -> FloatArray:
-        threshold = (
-            self._scale.activation_potential_mV - self._scale.rest_potential_mV
-        ) / self._scale.potential_range_mV
-        crossed = (earlier == NOT_ACTIVATED) & (before < threshold) & (after >= threshold)
-        if not crossed.any():
-            return earlier
-        times = np.array(earlier)
-        times[crossed] = time + substep * (threshold - before[crossed]) / (after[crossed] - before[crossed])
-        return times
+    def _inside(self, field: FloatArray) -> FloatArray:
+        """A field of the scene's elements on those that the unit solves on."""
+        return field if self._inner.mesh is self.mesh else field[self._inner.parents]
+
+    def _state_of(self, progress: Progress) -> dict[str, FloatArray]:
+        return {
+            **dict(zip(("phi", *self._ionic.states), progress.values, strict=True)),
+            "activation_time": progress.activation_time,
+            "increments": progress.increments,
+            "substep_ms": np.asarray(progress.substep_ms),
+        }

@@ -1,24 +1,28 @@
 """The direction through the wall and the place in it: a Laplace problem and two wall distances."""
 
-import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import spsolve
-from scipy.spatial import cKDTree
-from skfem import BilinearForm, condense
-from skfem.helpers import dot, grad
+from itertools import chain
 
-from ..arrays import FloatArray
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.linalg import LinearOperator, cg, spsolve
+from scipy.spatial import cKDTree
+
+from ..arrays import FloatArray, IntArray
 from ..errors import InvalidInput
 from ..mesh import Mesh
-from ..mesh.finite_elements import linear_basis, shape_gradients
+from ..mesh.finite_elements import diffusion_matrices, shape_gradients
+from ..mesh.sparsity import Pattern
 
 #: Gradient of the wall coordinate, relative to the largest, below which an element counts as having none.
 _FLAT = 1e-10
 
+#: Points whose wall distance is sought at a time, which bounds the memory, and faces that are looked at first.
+_BLOCK, _NEAREST = 1 << 13, 4
 
-@BilinearForm
-def _laplace(u, v, w):  # type: ignore[no-untyped-def]
-    return dot(grad(u), grad(v))
+
+#: Residual to which w is solved, relative to the right-hand side; what conjugate gradients do not reach in so many
+#: iterations, on slivers, is factorised.
+_TOLERANCE, _ITERATIONS = 1e-13, 2000
 
 
 def transmural_direction(mesh: Mesh, endocardium: tuple[str, ...], epicardium: tuple[str, ...]) -> FloatArray:
@@ -32,13 +36,23 @@ def transmural_direction(mesh: Mesh, endocardium: tuple[str, ...], epicardium: t
     inner, outer = mesh.boundary_nodes(*endocardium), mesh.boundary_nodes(*epicardium)
     w[inner] = 1.0
     w[outer] = 0.0
-    laplace = _laplace.assemble(linear_basis(mesh))
-    system, right, _, free = condense(laplace, x=w, D=np.union1d(inner, outer))
+    free = np.setdiff1d(np.arange(mesh.nodes), np.union1d(inner, outer))
     if len(free):
-        w[free] = spsolve(system.tocsc(), right)
+        laplace = Pattern(mesh.cells, mesh.nodes).matrix(
+            diffusion_matrices(mesh, np.broadcast_to(np.eye(3), (1, 3, 3)))
+        )
+        w[free] = _solved(laplace[free][:, free], -(laplace @ w)[free])
     gradient = np.einsum("ea,eai->ei", w[mesh.cells], shape_gradients(mesh))
     gradient = _filled_from_neighbours(mesh, gradient)
     return np.asarray(-gradient / np.linalg.norm(gradient, axis=1, keepdims=True))
+
+
+def _solved(system: csr_matrix, right: FloatArray) -> FloatArray:
+    """Both sides of the wall hold w: iterations grow with the elements across it only, a factor's memory with all."""
+    diagonal = system.diagonal()
+    preconditioner = LinearOperator(system.shape, matvec=lambda residual: residual / diagonal)
+    solution, failed = cg(system, right, rtol=_TOLERANCE, atol=0.0, maxiter=_ITERATIONS, M=preconditioner)
+    return np.asarray(spsolve(system.tocsc(), right) if failed else solution)
 
 
 def _filled_from_neighbours(mesh: Mesh, gradient: FloatArray) -> FloatArray:
@@ -69,20 +83,35 @@ def wall_distance(points: FloatArray, mesh: Mesh, boundaries: tuple[str, ...]) -
     """Distance in mm of `points`, shape (points, 3), to the nearest place on the faces of `boundaries`.
 
     Exact for the facetted surface. Candidates come from a tree of face centres: a face can only be nearest if its
-    centre is no farther than the nearest face corner plus its own radius.
+    centre is no farther than what the nearest centres' faces gave already, plus its own radius.
     """
     faces = np.concatenate([mesh.boundary(name) for name in boundaries])
     corners = mesh.points[faces]
     centres = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - centres[:, None], axis=2).max()
-    bound, _ = cKDTree(mesh.points[np.unique(faces)]).query(points)
-    candidates = cKDTree(centres).query_ball_point(points, bound + radius)
-    counts = np.fromiter(map(len, candidates), dtype=np.int64, count=len(points))
-    which = np.repeat(np.arange(len(points)), counts)
-    face = np.concatenate([np.asarray(found, dtype=np.int64) for found in candidates])
-    distance = np.full(len(points), np.inf)
-    np.minimum.at(distance, which, _distance_to_triangles(points[which], corners[face]))
+    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
+    tree, distance = cKDTree(centres), np.full(len(points), np.inf)
+    for begin in range(0, len(points), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        near = tree.query(points[part], k=np.arange(1, min(_NEAREST, len(faces)) + 1))[1]
+        distance[part] = _least_distance(points[part], corners, near.ravel(), np.full(len(near), near.shape[1]))
+        within = tree.query_ball_point(points[part], distance[part] + radii.max(), return_sorted=False)
+        counts = np.fromiter(map(len, within), dtype=np.int64, count=len(within))
+        face = np.fromiter(chain.from_iterable(within), dtype=np.int64, count=counts.sum())
+        which = np.repeat(np.arange(len(counts)), counts)
+        away = np.linalg.norm(points[part][which] - centres[face], axis=1)
+        nearer = away <= distance[part][which] + radii[face]
+        counts = np.bincount(which[nearer], minlength=len(counts))
+        distance[part] = np.minimum(distance[part], _least_distance(points[part], corners, face[nearer], counts))
     return distance
+
+
+def _least_distance(points: FloatArray, corners: FloatArray, face: IntArray, counts: IntArray) -> FloatArray:
+    """The least distance of each point to its candidates, `counts` of them each, one after the other in `face`."""
+    distances = _distance_to_triangles(np.repeat(points, counts, axis=0), corners[face])
+    least = np.full(len(points), np.inf)
+    some = counts > 0
+    least[some] = np.minimum.reduceat(distances, (np.cumsum(counts) - counts)[some])
+    return least
 
 
 def _distance_to_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:

@@ -3,3 +3,6 @@
 #include "vector_math.h"
 #include "solid.h"
 #include "quasi_newton.h"
+#include "ionic.h"
+#include "conjugate_gradients.h"
+#include "monodomain.h"

@@ -36,6 +36,11 @@ def row_keys(rows: IntArray, below: int) -> IntArray:
     return keys
 
 
+def repeated(keys: IntArray) -> int:
+    """How many of `keys` are there more than once, the first of each not counted."""
+    return int(np.count_nonzero(np.diff(np.sort(keys)) == 0))
+
+
 @dataclass(frozen=True)
 class Faces:
     """All faces of all elements, and how they meet.

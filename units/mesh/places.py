@@ -60,12 +60,18 @@ def _locate(
 def _nearest(mesh: Mesh, point: FloatArray) -> tuple[IntArray, FloatArray]:
     """Nodes and weights of the place that is nearest to `point`: the best of the feet of its perpendiculars.
 
-    Each foot is that on a corner, edge, face or whole element, and counts where that holds it.
+    Each foot is that on a corner, edge, face or whole element, and counts where that holds it. No element is looked at
+    whose nodes are all farther away than the nearest node and the longest edge.
     """
+    with np.errstate(over="ignore"):
+        away = np.linalg.norm(mesh.points - point, axis=1)
+    if not np.isfinite(away).all():
+        raise InvalidInput(f"the point {point.tolist()} lies outside the mesh, and nowhere near it")
+    cells = mesh.cells[away[mesh.cells].min(axis=1) <= away.min() + _longest_edge(mesh)]
     closest, nodes, weights = np.inf, np.empty(0, dtype=np.int64), np.empty(0)
     for count in range(1, mesh.dimension + 2):
         for part in combinations(range(mesh.dimension + 1), count):
-            vertices = mesh.cells[:, part]
+            vertices = cells[:, part]
             origin = mesh.points[vertices[:, 0]]
             edges = mesh.points[vertices[:, 1:]] - origin[:, None]
             along = np.linalg.solve(edges @ edges.transpose(0, 2, 1), edges @ (point - origin)[:, :, None])[:, :, 0]
@@ -79,3 +85,10 @@ def _nearest(mesh: Mesh, point: FloatArray) -> tuple[IntArray, FloatArray]:
     if not np.isfinite(closest):
         raise InvalidInput(f"the point {point.tolist()} lies outside the mesh, and nowhere near it")
     return nodes, weights
+
+
+def _longest_edge(mesh: Mesh) -> float:
+    """In mm; 0 for single points."""
+    pairs = combinations(range(mesh.dimension + 1), 2)
+    lengths = (np.linalg.norm(mesh.points[mesh.cells[:, a]] - mesh.points[mesh.cells[:, b]], axis=1) for a, b in pairs)
+    return max((float(length.max()) for length in lengths), default=0.0)

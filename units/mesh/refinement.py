@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays import IntArray
-from .finite_elements import linear_basis
+from .faces import row_keys
+from .finite_elements import as_scikit_fem
 from .simplices import Mesh
 
 
@@ -28,7 +29,7 @@ def refined(mesh: Mesh, levels: int) -> Refined:
 
 
 def _halved(mesh: Mesh) -> tuple[Mesh, IntArray]:
-    coarse = linear_basis(mesh).mesh
+    coarse = as_scikit_fem(mesh)
     fine = coarse.refined(1)
     points = np.tile(mesh.points[0], (fine.p.shape[1], 1))
     points[:, : mesh.dimension] = fine.p.T
@@ -46,7 +47,10 @@ def _edges(mesh: Any, dimension: int) -> IntArray:
 def _parents(mesh: Mesh, edges: IntArray, cells: IntArray) -> IntArray:
     """The corners and the edges with whose midpoints a part is made are, together, those of one element."""
     own = np.repeat(np.arange(mesh.nodes)[:, None], 2, axis=1)
-    made_of = np.vstack([own, edges])[cells].reshape(len(cells), -1)
-    corners = np.array([np.unique(nodes) for nodes in made_of])
-    number = {tuple(nodes): element for element, nodes in enumerate(np.sort(mesh.cells, axis=1).tolist())}
-    return np.array([number[tuple(nodes)] for nodes in corners.tolist()], dtype=np.int64)
+    made_of = np.sort(np.vstack([own, edges])[cells].reshape(len(cells), -1), axis=1)
+    different = np.ones(made_of.shape, dtype=bool)
+    different[:, 1:] = made_of[:, 1:] != made_of[:, :-1]
+    corners = made_of[different].reshape(len(cells), -1)
+    keys = row_keys(np.concatenate([mesh.cells, corners]), mesh.nodes)
+    order = np.argsort(keys[: mesh.elements])
+    return order[np.searchsorted(keys[: mesh.elements], keys[mesh.elements :], sorter=order)]

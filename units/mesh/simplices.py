@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..errors import InvalidInput, listed
-from .faces import Faces, faces_of, row_keys
+from .faces import Faces, faces_of, repeated, row_keys
 
 #: A coordinate that nothing can be computed with: a thousand kilometres, in mm.
 _FARTHEST_MM = 1e9
@@ -56,9 +56,11 @@ class Mesh:
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
         faces = self._checked_faces()
+        # What the check found is what the cached property would find again.
+        self.__dict__["surface"] = faces.surface
         boundaries = self._outward(faces.surface) if self.boundaries else {}
         object.__setattr__(self, "boundaries", boundaries)
-        for array in (points, cells, *boundaries.values()):
+        for array in (points, cells, faces.surface, *boundaries.values()):
             array.setflags(write=False)
 
     @property
@@ -156,7 +158,7 @@ class Mesh:
         if self.dimension == 0:
             # Points are cells that do not know of each other.
             return faces_of(cells, len(points))
-        twice = len(cells) - len(np.unique(row_keys(cells, len(points))))
+        twice = repeated(row_keys(cells, len(points)))
         if twice:
             raise InvalidInput(f"{twice} of {len(cells)} elements are listed twice; list each once")
         faces = faces_of(cells, len(points))
@@ -214,7 +216,7 @@ class Mesh:
                     f"of the mesh, the first is {faces[_first(~found)].tolist()}; take those that lie between "
                     "elements, or on nothing, out of the group (if a cavity is meshed too, save the wall's volume only)"
                 )
-            twice = len(place) - len(np.unique(place))
+            twice = repeated(place)
             if twice:
                 raise InvalidInput(f"{twice} faces of the boundary '{name}' are listed twice; list each once")
             outward[name] = surface[place]

@@ -9,15 +9,23 @@ The recovery rate has a pole at φ = −μ₂ (−110 mV). An explicit step can 
 numbers, so whoever advances the model has to watch that φ stays above.
 """
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from typing import ClassVar
 
-from ..arrays import FloatArray
-from ..variable import parameter
+import numpy as np
+
+from ...arrays import FloatArray
+from ...variable import parameter
 
 
 @dataclass(frozen=True)
 class AlievPanfilov:
     """Parameters of the ionic model, all dimensionless (Göktepe & Kuhl 2010)."""
+
+    name: ClassVar[str] = "aliev_panfilov"
+    states: ClassVar[tuple[str, ...]] = ("recovery",)
+    dimensionless_time: ClassVar[bool] = True
+    kernel: ClassVar[str | None] = "aliev_panfilov"
 
     excitation_rate: float = parameter(8.0, "1", "c, strength of the excitation current", above=0.0)
     excitation_threshold: float = parameter(0.01, "1", "alpha, threshold of excitation", at_least=0.0, below=0.5)
@@ -26,7 +34,11 @@ class AlievPanfilov:
     recovery_mu2: float = parameter(0.3, "1", "mu_2, offset of the state-dependent recovery rate", above=0.0)
     recovery_offset: float = parameter(0.15, "1", "b, offset of the recovery's target", at_least=0.0)
 
-    def rates(self, phi: FloatArray, recovery: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def initial(self, phi: FloatArray) -> tuple[FloatArray, ...]:
+        """r = 0."""
+        return (np.zeros_like(phi),)
+
+    def rates(self, phi: FloatArray, recovery: FloatArray) -> tuple[FloatArray, ...]:
         """∂φ/∂τ and ∂r/∂τ without diffusion and stretch current, shapes as given."""
         current = phi * (self.excitation_rate * (phi - self.excitation_threshold) * (phi - 1.0) + recovery)
         rate = self.recovery_rate + self.recovery_mu1 * recovery / (self.recovery_mu2 + phi)
@@ -37,3 +49,18 @@ class AlievPanfilov:
     def longest_step(self) -> float:
         """Dimensionless step below which an explicit step of second order resolves the fastest rate and is stable."""
         return 1.0 / self.excitation_rate
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """See IonicModel."""
+        return astuple(self)
+
+    @property
+    def lowest_phi(self) -> float:
+        """−μ₂."""
+        return -self.recovery_mu2
+
+    @property
+    def lowest_phi_reason(self) -> str:
+        """See IonicModel."""
+        return "the pole of the ionic model's recovery rate"
