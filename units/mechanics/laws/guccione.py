@@ -29,7 +29,7 @@ class Guccione:
     guccione_transverse: float = parameter(2.0, "1", "b_t, across the fibre", above=0.0)
     guccione_shear: float = parameter(4.0, "1", "b_fs, in shear between the fibre and its normals", above=0.0)
     guccione_bulk_modulus_MPa: float = parameter(
-        1.0, "MPa", "kappa, penalty of Guccione's law on a change of volume", above=0.0
+        0.5, "MPa", "kappa, penalty of Guccione's law on a change of volume", above=0.0
     )
 
     @property
