@@ -79,7 +79,7 @@ def ellipsoid(through: int) -> Mesh:
 
 
 def apex_mm(mesh: Mesh, order: int, bulk_MPa: float = BULK_MPA) -> float:
-    """Problem 2: the height in mm of the node in the middle of the wall at the apex, one of P1 where the cells are even."""
+    """Problem 2: the height in mm of the apex in the middle of the wall, a node of P1 where the cells are even."""
     law = Guccione(0.01, guccione_bulk_modulus_MPa=bulk_MPa, **_ISOTROPIC)
     space = ELEMENTS[order](mesh)
     fixed = space.points == 0.0

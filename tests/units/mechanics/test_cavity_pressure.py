@@ -64,7 +64,7 @@ def _deformed(points: np.ndarray) -> np.ndarray:
 
 
 def _jacobian(load: CavityPressure, displacement: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Derivative of the forces at free degrees of freedom; they are quadratic, so that central differences are exact."""
+    """Derivative of the forces by what is free; they are quadratic, so that central differences are exact."""
     columns = []
     for place in np.flatnonzero(free):
         step = np.zeros(displacement.size)
