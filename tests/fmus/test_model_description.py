@@ -31,12 +31,14 @@ _SI = {
     "1/mV": ((-1, -2, 3, 1, 0), 1 / 1e-3),
     "kPa": ((1, -1, -2, 0, 0), 1e3),
     "MPa": ((1, -1, -2, 0, 0), 1e6),
+    "kPa/mm": ((1, -2, -2, 0, 0), 1e3 / 1e-3),
     # Pa/V: (kg m-1 s-2) / (kg m2 s-3 A-1)
     "MPa/mV": ((0, -3, 1, 1, 0), 1e6 / 1e-3),
 }
 
 # The unit of measure that the end of a parameter's name promises.
 _SUFFIXES = {
+    "_kPa_per_mm": ("kPa/mm",),
     "_per_mV": ("1/mV", "MPa/mV"),
     "_per_ms": ("1/ms", "mm2/ms"),
     "_mV": ("mV",),
