@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from threadpoolctl import threadpool_limits
 
 from .assembly import assemble, called_directly, checked_mesh
 from .coupling.master import Observer
@@ -60,6 +61,9 @@ def run_scenario(
     started = time.perf_counter()
     console = console or Console(quiet=True)
     with ResultsFolder(output, Origin.of(scenario, base)) as folder, ExitStack() as stack:
+        # The units' vectors are short: BLAS's threads cost more than they bring, many times as much where several
+        # processes share the cores, and the bits of a sum depend on their number.
+        stack.enter_context(threadpool_limits(limits=1))
         drawing = stack.enter_context(Drawing(output)) if figures else None
         summary = folder.complete() if resume else None
         if summary is None:
