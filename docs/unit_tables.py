@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from cardiac_cosim.units.registry import UNITS
-from cardiac_cosim.units.unit import Unit
+from cardiac_cosim.units.unit import FALLBACKS, IMPLEMENTATION, Unit
 from cardiac_cosim.units.variable import Causality, Location, Variable
 
 PAGE = Path(__file__).parent / "units.md"
@@ -12,14 +12,17 @@ PAGE = Path(__file__).parent / "units.md"
 def page() -> str:
     """The text of docs/units.md."""
     origin = "Written by `python docs/unit_tables.py` from the declarations in `units/`."
-    parts = [f"# The units and their variables\n\n{origin}\n"]
+    told = " and ".join(f"`{item.name}`, {item.description}" for item in (IMPLEMENTATION, FALLBACKS))
+    both = f"Every unit has two texts besides, calculated parameters in FMI, once it is initialised: {told}."
+    parts = [f"# The units and their variables\n\n{origin}\n\n{both}\n"]
     return "\n".join(parts + [_unit(unit) for unit in UNITS.values()])
 
 
 def _unit(unit: type[Unit]) -> str:
     summary = (unit.__doc__ or "").splitlines()[0]
     lines = [f"## `{unit.name}`\n", f"{summary}\n"]
-    fields = [variable for variable in unit.variables() if variable.causality is not Causality.PARAMETER]
+    exchanged = (Causality.INPUT, Causality.OUTPUT)
+    fields = [variable for variable in unit.variables() if variable.causality in exchanged]
     parameters = [variable for variable in unit.variables() if variable.causality is Causality.PARAMETER]
     lines += ["| variable | | unit | shape | description |", "|---|---|---|---|---|"]
     lines += [

@@ -19,7 +19,7 @@ def annotations(unit: type[Unit]) -> Iterator[str]:
     """The lines of the element `Unit`, with a `Field` for each input and output."""
     yield tag("Unit", name=unit.name, memoryless=str(unit.memoryless).lower())
     for variable in unit.variables():
-        if variable.causality is Causality.PARAMETER:
+        if variable.causality not in (Causality.INPUT, Causality.OUTPUT):
             continue
         extra = {"needs": variable.needs} if variable.needs else {}
         if variable.record is not Record.NOTHING:

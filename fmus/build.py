@@ -59,7 +59,9 @@ def sources() -> dict[str, bytes]:
     """The code an FMU carries, by its path in the package."""
     own = Path(__file__).parent
     floor = Path(registry.__file__).parent
-    modules = sorted(path.relative_to(floor) for path in floor.rglob("*.py"))
+    # Kernels that were compiled when the package was built go along; an FMU without them falls back to NumPy.
+    files_there = (path for path in floor.rglob("*") if path.suffix in (".py", ".so"))
+    modules = sorted(path.relative_to(floor) for path in files_there)
     files = {f"units/{path.as_posix()}": (floor / path).read_bytes() for path in modules if path.parts[0] != "geometry"}
     # Code that differs in as little as this has another hash, and is never taken for the other.
     names = _OWN_FILES if wrapper.library() is not None else (*_OWN_FILES, _PYTHONFMU_FILE)

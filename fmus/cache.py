@@ -1,13 +1,16 @@
 """FMUs built once: kept in the user's cache, or in a folder of their choice, never in the installed package."""
 
 import errno
+import hashlib
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
 from ..units.mesh import Mesh
 from ..units.unit import Unit
+from .archive import put_in_place
 from .build import build_fmu, fingerprint, guid_of
 from .fmi3.build import build_fmu as build_fmi3
 from .fmi3.build import fingerprint as fingerprint_fmi3
@@ -25,7 +28,7 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
 
     OSError where the FMU cannot be built there.
     """
-    root = folder if folder is not None else _user_cache() / "fmus"
+    root = folder if folder is not None else user_cache() / "fmus"
     if fmi not in (2, 3):
         raise ValueError(f"there are FMUs of FMI 2 and 3, not {fmi}")
     key, build = (fingerprint(unit, mesh), build_fmu) if fmi == 2 else (fingerprint_fmi3(unit, mesh), build_fmi3)
@@ -33,7 +36,8 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
     return path if _holds(path, guid_of(key)) else build(unit, mesh, path)
 
 
-def _user_cache() -> Path:
+def user_cache() -> Path:
+    """The user's cache of this program, which need not exist; OSError where there is no home for one."""
     path = user_cache_path("cardiac-cosim")
     # Where nobody knows a home folder it would be one called `~`, below the folder that the person is in.
     if not path.is_absolute():
@@ -42,10 +46,23 @@ def _user_cache() -> Path:
 
 
 def _holds(path: Path, guid: str) -> bool:
-    """Whether the FMU at `path` is the one that is known by `guid`, readable and with all its bytes as written."""
+    """Whether the FMU at `path` is the one that is known by `guid`, readable and with all its bytes as written.
+
+    Once that was seen, a hash of the file lies beside it, which tells as much in a tenth of the time.
+    """
+    seal = path.with_suffix(".sha256")
     try:
+        with path.open("rb") as file:
+            found = hashlib.file_digest(file, "sha256").hexdigest()
+        if seal.is_file() and seal.read_text(encoding="ascii") == found:
+            return True
         with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as description:
-            return guid.encode() in description.read(_HEAD) and archive.testzip() is None
+            whole = guid.encode() in description.read(_HEAD) and archive.testzip() is None
     # A damaged archive ends in whatever its damaged part is taken for: a kind of compression, an encryption, a size.
     except Exception:
         return False
+    if whole:
+        # Where the cache cannot be written, the FMU is looked through every time.
+        with suppress(OSError), put_in_place(seal) as part:
+            part.write_text(found, encoding="ascii")
+    return whole

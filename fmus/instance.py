@@ -137,7 +137,7 @@ class UnitInstance:
         name = run.variable.name
         if name not in self._staged:
             if run.variable.causality is not Causality.INPUT:
-                raise InvalidInput(f"'{name}' is an output and cannot be set")
+                raise InvalidInput(f"'{name}' is {run.variable.causality} and cannot be set")
             self._staged[name] = np.array(self.unit.get(name), dtype=float).ravel()
             self._read.pop(name, None)
         return self._staged[name]

@@ -3,7 +3,7 @@
 What depends on what. Outputs change in a step only; `dependencies` therefore names, for each output, the inputs that
 the step carries over to it. An output that follows all inputs everywhere has no such attribute, which by the standard
 means just that; a pointwise one (active stress) names the inputs at its own place; one without inputs (fibres) has
-the empty list.
+the empty list. What a unit computes with on the machine it runs on follows no variable: it is a calculated parameter.
 """
 
 from collections.abc import Iterator
@@ -14,6 +14,8 @@ from scipy.sparse import csr_matrix
 
 from ..units.input_ramp import INPUT_INTERPOLATION as INPUT_INTERPOLATION
 from ..units.mesh import Mesh
+from ..units.unit import FALLBACKS as _FALLBACKS
+from ..units.unit import IMPLEMENTATION as _IMPLEMENTATION
 from ..units.unit import Unit
 from ..units.variable import Causality, Location
 from .annotations import TOOL as TOOL
@@ -22,6 +24,9 @@ from .description_head import default_experiment, log_categories, origin
 from .layout import Run, layout
 from .unit_definitions import unit_definitions
 from .xml_tag import tag
+
+#: The variables in which an FMU says what it computes with.
+IMPLEMENTATION, FALLBACKS = _IMPLEMENTATION.name, _FALLBACKS.name
 
 _CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -65,7 +70,8 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
             "<InitialUnknowns>",
             *(
                 tag("Unknown", index=str(run.first + 1 + k), end=True)
-                for run in _outputs(runs)
+                for run in runs
+                if run.variable.causality in (Causality.OUTPUT, Causality.CALCULATED_PARAMETER)
                 for k in range(run.size)
             ),
             "</InitialUnknowns>",
@@ -88,6 +94,9 @@ def _scalars(run: Run) -> Iterator[str]:
     if variable.causality is Causality.PARAMETER:
         kind = ' causality="parameter" variability="fixed" initial="exact"'
         value = f"<{run.fmi_type} start={start}{unit}{_bounds(run)}/>"
+    elif variable.causality is Causality.CALCULATED_PARAMETER:
+        kind = ' causality="calculatedParameter" variability="fixed" initial="calculated"'
+        value = f"<{run.fmi_type}/>"
     elif variable.causality is Causality.INPUT:
         kind = f' causality="input" variability="{"discrete" if variable.fixed else "continuous"}"'
         value = f"<Real start={start}{unit}/>"

@@ -21,6 +21,7 @@ _UNITS: dict[str, dict[str, float]] = {
     "1/mV": {"kg": -1, "m": -2, "s": 3, "A": 1, "factor": 1e3},
     "kPa": {"kg": 1, "m": -1, "s": -2, "factor": 1e3},
     "MPa": {"kg": 1, "m": -1, "s": -2, "factor": 1e6},
+    "kPa/mm": {"kg": 1, "m": -2, "s": -2, "factor": 1e6},
     "MPa/mV": {"m": -3, "s": 1, "A": 1, "factor": 1e9},
 }
 

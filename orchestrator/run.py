@@ -1,7 +1,8 @@
 """A whole run: scenario in, results folder out."""
 
 import time
-from contextlib import ExitStack, nullcontext
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,11 @@ from typing import Any
 from rich.console import Console
 
 from .assembly import assemble, called_directly, checked_mesh
+from .coupling.master import Observer
+from .drawing import Drawing
 from .errors import InputError, Interrupted, RunError
 from .progress import ProgressBar
+from .results import implementation
 from .results.folder import ResultsFolder
 from .results.origin import Origin
 from .scenario import Scenario
@@ -55,11 +59,16 @@ def run_scenario(
     """
     started = time.perf_counter()
     console = console or Console(quiet=True)
-    with ResultsFolder(output, Origin.of(scenario, base)) as folder:
+    with ResultsFolder(output, Origin.of(scenario, base)) as folder, ExitStack() as stack:
+        drawing = stack.enter_context(Drawing(output)) if figures else None
         summary = folder.complete() if resume else None
         if summary is None:
-            summary = _run(folder, scenario, base, console, fmu_dir, resume, started)
-        return Outcome(output, summary, _draw(output, console) if figures else ())
+            observers = [] if drawing is None else [drawing]
+            summary = _run(folder, scenario, base, console, fmu_dir, resume, started, observers)
+        if drawing is None:
+            return Outcome(output, summary)
+        with console.status("drawing the figures"):
+            return Outcome(output, summary, drawing.finish())
 
 
 def _run(
@@ -70,14 +79,14 @@ def _run(
     fmu_dir: Path | None,
     resume: bool,
     started: float,
+    observers: Sequence[Observer],
 ) -> dict[str, Any]:
     before = folder.checkpoint() if resume else None
     mesh = checked_mesh(scenario, base)
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
         assembly = assemble(stack, scenario, base, mesh, fmu_dir)
-        for text in assembly.warnings:
-            console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
+        _warn(console, assembly.warnings)
         master = assembly.master
         ready = time.perf_counter()
         unready = None
@@ -90,35 +99,40 @@ def _run(
             else:
                 with folder.fitting():
                     master.resume(before["master"])
+            implementations = implementation.implementations(assembly.participants)
         except RunError as error:
             if before is not None:
                 raise InputError(f"{folder.path}: {error}; run without --resume to begin anew") from error
-            unready = error
+            unready, implementations = error, {}
+        if before is not None:
+            with folder.fitting(), _about(folder.path):
+                implementation.check(before["implementation"], implementations)
+        _warn(console, implementation.fallbacks(implementations.values()))
         # Nothing in the folder was touched up to here.
-        recording = folder.record(assembly, before, wall)
+        recording = folder.record(assembly, before, wall, implementations)
         bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
         with recording, bar:
             if unready is not None:
                 raise unready
-            master.run([recording, bar], stop)
+            master.run([recording, *observers, bar], stop)
             if stop.signal is not None and not master.done:
                 recording.keep()
                 raise Interrupted(stop.signal)
     return recording.summary
 
 
-def _draw(output: Path, console: Console) -> tuple[str, ...]:
-    """Draw the figures; the warnings of those that cannot be."""
-    # Imported here, so that whoever draws nothing does not wait for the plotting library.
-    from .results.figures import draw_figures
+def _warn(console: Console, warnings: Iterable[str]) -> None:
+    for text in warnings:
+        console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
 
+
+@contextmanager
+def _about(path: Path) -> Iterator[None]:
+    """Put the folder in front of what is wrong with what is in it."""
     try:
-        with console.status("drawing the figures"):
-            draw_figures(output)
-    except OSError as error:
-        place = error.filename or output / "figures"
-        return (f"the figures cannot be drawn: {place}: {error.strerror or error}; all other results are complete",)
-    return ()
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -> str:

@@ -46,7 +46,7 @@ def _watched(work: Callable[[], None]) -> int:
         # A group of its own: what a terminal sends to all of its foreground reaches the parent, and from there once.
         os.setpgid(0, 0)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        _end_with(parent)
+        end_with(parent)
         activity.show_on(board)
         _end(board, work)
     return _verdict(_wait(child, heard), board)
@@ -66,8 +66,10 @@ def _end(board: activity.Board, work: Callable[[], None]) -> None:
     sys.exit(0)
 
 
-def _end_with(parent: int) -> None:
-    """Nobody is left alone: when the parent is killed, so is this process."""
+def end_with(parent: int) -> None:
+    """Nobody is left alone: when the `parent` of this process is gone, it is killed, on Linux."""
+    if sys.platform != "linux":
+        return
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)

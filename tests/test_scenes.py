@@ -37,9 +37,10 @@ def test_every_scene_runs_and_says_what_one_learns(name: str, tmp_path: Path) ->
     series, summary = _run(name, tmp_path, *_SHORT.get(name, ()))
     assert summary["status"] == "done"
     assert len(series) == summary["steps"] + 1
-    potentials = [column for column in series.dtype.names or () if column.startswith("potential_")]
-    assert potentials
-    for column in potentials:
+    watched = "lv_pressure_" if name == "inflation" else "potential_"
+    columns = [column for column in series.dtype.names or () if column.startswith(watched)]
+    assert columns
+    for column in columns:
         assert np.isfinite(series[column]).all()
     with h5py.File(tmp_path / name / "fields.h5") as file:
         assert file["frames_ms"][-1] == summary["end_ms"]
@@ -101,6 +102,22 @@ def test_the_sheets_wave_is_faster_along_the_fibres(tmp_path: Path) -> None:
     along = slope(0, (np.abs(points[:, 1]) < 1.0) & (points[:, 0] > 25.0) & (points[:, 0] < 50.0))
     across = slope(1, (points[:, 0] < 1.0) & (points[:, 1] > 15.0) & (points[:, 1] < 25.0))
     assert along / across == pytest.approx(np.sqrt(1.1), rel=0.05)
+
+
+def test_the_pressure_volume_curve_of_the_resting_ventricle(tmp_path: Path) -> None:
+    series, summary = _run("inflation", tmp_path)
+    pressure, volume = series["lv_pressure_kPa"], series["lv_volume_ml"]
+    np.testing.assert_allclose(pressure, np.linspace(0.0, 3.0, 21), atol=1e-12)
+    assert (np.diff(volume) > 0.0).all()
+    # By two thirds and more at 2 kPa; stiffer at the end than half of the way.
+    assert volume[0] == pytest.approx(37.8, abs=0.1)
+    assert 1.6 < np.interp(2.0, pressure, volume) / volume[0] < 1.9
+    compliance = np.diff(volume) / np.diff(pressure)
+    assert compliance[-1] < 0.7 * compliance.max()
+    assert summary["lv_pressure_kPa"]["max"] == 3.0
+    # Linear elements of the same size resist more: locking makes a heart that cannot be filled.
+    linear, _ = _run("inflation", tmp_path / "linear", "units.mechanics.parameters.element_order=1")
+    assert np.interp(1.0, pressure, linear["lv_volume_ml"]) < np.interp(1.0, pressure, volume) - 1.0
 
 
 # --- scenes that are one another's limits -------------------------------------------------------------------------

@@ -21,6 +21,25 @@ from .variable import Causality, Location, Scalar, Variable, parameters_of
 Group = TypeVar("Group")
 _MS_PER_S = 1000.0
 
+#: What every unit says of itself beside its physics, once it is initialised (`Unit.implementation`, `Unit.fallbacks`).
+IMPLEMENTATION = Variable(
+    "implementation",
+    Causality.CALCULATED_PARAMETER,
+    "1",
+    "what the unit computes with on this machine: kernels, instruction set, linear solver; results differ between them "
+    "in their last digits",
+    start="",
+    fixed=True,
+)
+FALLBACKS = Variable(
+    "fallbacks",
+    Causality.CALCULATED_PARAMETER,
+    "1",
+    "what is slower on this machine than it need be, and what helps: a sentence a line",
+    start="",
+    fixed=True,
+)
+
 #: Orders of magnitude that a change of sign counts for, and parameters that a message names.
 _FAR, _MOST_TOLD = 5.0, 3
 
@@ -74,7 +93,7 @@ class Unit(ABC):
 
     @classmethod
     def variables(cls) -> tuple[Variable, ...]:
-        """Every variable of the unit: parameters first, then inputs and outputs, then the outputs' statistics."""
+        """All of its variables: parameters, inputs and outputs, the outputs' statistics, what it computes with."""
         return tuple(_declared(cls).values())
 
     @classmethod
@@ -108,6 +127,22 @@ class Unit(ABC):
             parameters: object = self.parameters(group)
             if isinstance(parameters, Placed):
                 yield from parameters.warnings(self.mesh)
+
+    # --- the machine --------------------------------------------------------------------------------------------------
+
+    def implementation(self) -> str:
+        """What it computes with on this machine, as far as bits depend on it: kernels, instruction set, linear solver.
+
+        Asked for when the unit is prepared. Two that say the same give the same bits.
+        """
+        return "NumPy"
+
+    def fallbacks(self) -> Iterator[str]:
+        """What is slower on this machine than it need be, in sentences for a person, each with the remedy.
+
+        Asked for when the unit is prepared. Units that lack the same say it in the same words.
+        """
+        yield from ()
 
     # --- life cycle, in FMI order -------------------------------------------------------------------------------------
 
@@ -202,14 +237,15 @@ class Unit(ABC):
                 return
             self._inputs[name] = field
         else:
-            raise InvalidInput(f"'{name}' is an output of unit '{self.name}' and cannot be set")
+            raise InvalidInput(f"'{name}' is {variable.causality} of unit '{self.name}' and cannot be set")
         self._foreseen = None
 
     def get(self, name: str) -> Any:
         """A variable's value: read-only array of the declared shape, or the parameter's scalar.
 
         In initialization mode an output is what it would be if that ended now, which is where masters look for the
-        initial values of inputs (FMI 2.0.4, section 4.2.4); directions that were not given yet are guessed.
+        initial values of inputs (FMI 2.0.4, section 4.2.4); directions that were not given yet are guessed. What the
+        unit computes with is an empty text until it is initialised.
 
         Raises
         ------
@@ -221,6 +257,8 @@ class Unit(ABC):
             return self._parameters.get(name, variable.start)
         if variable.causality is Causality.INPUT:
             return self._inputs[name] if name in self._inputs else self._default(variable)
+        if variable.causality is Causality.CALCULATED_PARAMETER:
+            return self._told(variable)
         self._require(Phase.INITIALIZATION, Phase.STEPPING, Phase.TERMINATED)
         state = self._foresee() if self.phase is Phase.INITIALIZATION else self._state
         source = variable.source.name if isinstance(variable, Statistic) else name
@@ -294,6 +332,11 @@ class Unit(ABC):
     @abstractmethod
     def output(self, name: str, state: State) -> FloatArray:
         """The output `name` of `fields` in `state`, read-only, of the declared shape."""
+
+    def _told(self, variable: Variable) -> str:
+        if self.phase in (Phase.INSTANTIATED, Phase.INITIALIZATION):
+            return ""
+        return self.implementation() if variable is IMPLEMENTATION else "\n".join(self.fallbacks())
 
     @property
     def _ramps(self) -> bool:
@@ -398,7 +441,7 @@ class Unit(ABC):
     def _parameter(self, name: str) -> Variable:
         variable = self.variable(name)
         if variable.causality is not Causality.PARAMETER:
-            raise InvalidInput(f"'{name}' is an {variable.causality.value} of unit '{self.name}', not a parameter")
+            raise InvalidInput(f"'{name}' is {variable.causality} of unit '{self.name}', not a parameter")
         return variable
 
     def _sound(self, state: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -415,7 +458,8 @@ def _declared(unit: type[Unit]) -> dict[str, Variable]:
     """All variables by name, in their order; kept, because every `get` and `set` looks one up."""
     parameters = (variable for group in unit.groups for variable in parameters_of(group))
     declared: dict[str, Variable] = {}
-    for variable in (*parameters, *unit.fields, *statistics(unit.fields)):
+    own = (IMPLEMENTATION, FALLBACKS)
+    for variable in (*parameters, *unit.fields, *statistics(unit.fields), *own):
         if variable.name in declared:
             raise TypeError(f"the variable '{variable.name}' is declared twice")
         declared[variable.name] = variable

@@ -22,6 +22,11 @@ class Causality(Enum):
     PARAMETER = "parameter"
     INPUT = "input"
     OUTPUT = "output"
+    CALCULATED_PARAMETER = "calculatedParameter"
+
+    def __str__(self) -> str:
+        """For a person, with its article."""
+        return f"{'an' if self.value[0] in 'aeiou' else 'a'} {self.value.replace('P', ' p')}"
 
 
 class Location(Enum):

@@ -62,7 +62,11 @@ def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> st
             "</ModelVariables>",
             "<ModelStructure>",
             *_outputs(entries, outputs),
-            *(tag("InitialUnknown", valueReference=str(entry.reference), end=True) for entry in outputs),
+            *(
+                tag("InitialUnknown", valueReference=str(entry.reference), end=True)
+                for entry in entries
+                if _is_unknown(entry)
+            ),
             "</ModelStructure>",
             "<Annotations>",
             tag("Annotation", type=TOOL),
@@ -74,11 +78,18 @@ def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> st
     )
 
 
+def _is_unknown(entry: Entry) -> bool:
+    """Whether the unit computes its initial value."""
+    return entry.variable.causality in (Causality.OUTPUT, Causality.CALCULATED_PARAMETER)
+
+
 def _variable(entry: Entry) -> str:
     variable = entry.variable
     attributes = {"name": variable.name, "valueReference": str(entry.reference), "causality": variable.causality.value}
     if variable.causality is Causality.PARAMETER:
         attributes |= {"variability": "fixed", "initial": "exact"}
+    elif variable.causality is Causality.CALCULATED_PARAMETER:
+        attributes |= {"variability": "fixed", "initial": "calculated"}
     else:
         attributes |= {"variability": "discrete" if variable.fixed else "continuous"}
     if variable.causality is Causality.OUTPUT:
@@ -90,7 +101,7 @@ def _variable(entry: Entry) -> str:
     if variable.at_least is not None:
         attributes |= {"min": f"{variable.at_least:.17g}"}
     nested = "".join(tag("Dimension", start=str(count), end=True) for count in entry.shape)
-    if variable.causality is not Causality.OUTPUT:
+    if not _is_unknown(entry):
         if entry.fmi_type == "String":
             nested += f"<Start value={quoteattr(str(variable.start))}/>"
         else:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, did_you_mean
-from .participant import Abilities, Participant, Ports, Ramp, Values, Wait
+from .participant import Abilities, Implementation, Participant, Ports, Ramp, Values, Wait
 from .signals import Signal, read_table
 
 
@@ -80,6 +80,10 @@ class Driven:
     def unpack(self, data: bytes) -> None:
         """See Participant."""
         self._participant.unpack(data)
+
+    def implementation(self) -> Implementation:
+        """See Participant."""
+        return self._participant.implementation()
 
     def log_to(self, path: Path) -> None:
         """See Participant."""

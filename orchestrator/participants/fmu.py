@@ -17,12 +17,12 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from ...fmus.model_description import INPUT_INTERPOLATION
+from ...fmus.model_description import FALLBACKS, IMPLEMENTATION, INPUT_INTERPOLATION
 from ..activity import doing
 from ..errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
 from .fmi2_calls import Fmi2Calls
 from .fmi3_calls import Fmi3Calls
-from .fmu_description import Description, read_description
+from .fmu_digest import Digest, read_digest
 from .fmu_file import FmuFile, check_binary
 from .fmu_log import FmuLog
 from .fmu_variables import (
@@ -32,10 +32,11 @@ from .fmu_variables import (
     check_start,
     declares_ramps,
     fields,
+    groups,
     ports,
     ramps_itself,
 )
-from .participant import Abilities, Parameters, Ports, Ramp, Values, Wait
+from .participant import Abilities, Implementation, Parameters, Ports, Ramp, Values, Wait
 from .ramping import PendingRamps
 
 _FATAL = 4
@@ -151,33 +152,34 @@ class FmuParticipant:
         self._only: tuple[str, str] | None = None
         with self._naming(path):
             file = FmuFile(path)
-            description = read_description(file)
-            check_binary(file, description)
-            variables = description.modelVariables
+            digest = read_digest(file, {*parameters, *(start or {})}, whole=bool(observe))
+            check_binary(digest.names, digest)
+            variables = digest.modelVariables
             if ramps and declares_ramps(variables):
                 parameters = {INPUT_INTERPOLATION: "linear"} | parameters
             check_parameters(parameters, variables)
             check_start(start or {}, variables)
-            self._inputs = fields(description, ("input",), parameters)
-            self._outputs = fields(description, ("output",), parameters)
+            self._inputs = fields(digest, digest.inputs, parameters)
+            self._outputs = fields(digest, digest.outputs, parameters)
             self.inputs, self.outputs = ports(self._inputs), ports(self._outputs)
-            self._observed = fields(description, READABLE, parameters) if observe else {}
+            self._told = _told(digest)
+            self._observed = fields(digest, groups(variables, READABLE), parameters) if observe else {}
             self._observable = ports(self._observed)
             self.observed = self._observable.chosen(observe, f"unit '{name}'")
             ramps_by_itself = ramps_itself(variables, parameters)
-            self.abilities = _abilities(description.coSimulation, ramps_by_itself, description.memoryless)
+            self.abilities = _abilities(digest.coSimulation, ramps_by_itself, digest.memoryless)
             self._elements: dict[tuple[bool, str], Field] = {}
             self._pending = PendingRamps()
             self._ramps: dict[str, Ramp] = {}
             self._order = _HIGHEST_ORDER
-            calls = _CALLS[description.fmiVersion](description)
+            calls = _CALLS[digest.fmiVersion](digest)
             self._log = calls.log
             self._log.instance = name
             self._takes_derivatives = calls.takes_derivatives
             if not loaded:
                 return
             try:
-                self._claim(description)
+                self._claim(digest)
                 self._folder = Path(tempfile.mkdtemp(prefix="cosim-fmu-"))
                 file.unpack(self._folder)
                 self._instantiate(calls)
@@ -321,6 +323,11 @@ class FmuParticipant:
         finally:
             self.free(state)
 
+    def implementation(self) -> Implementation:
+        """See Participant; this project's FMUs tell it in two variables."""
+        told = {name: str(self._read(field)) for name, field in self._told.items()}
+        return Implementation(told.get(IMPLEMENTATION, ""), tuple(told.get(FALLBACKS, "").splitlines()))
+
     def log_to(self, path: Path) -> None:
         """See Participant."""
         self._log.write_to(path)
@@ -407,7 +414,7 @@ class FmuParticipant:
             raise InputError(_why_not(str(error), str(calls.log))) from None
         self._calls = calls
 
-    def _claim(self, description: Description) -> None:
+    def _claim(self, description: Digest) -> None:
         """InputError if the FMU can be in a process once only, and is there already."""
         if not description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
             return
@@ -445,6 +452,12 @@ def _abilities(declared: Any, ramps_itself: bool, memoryless: bool) -> Abilities
         any_step_size=bool(declared.canHandleVariableCommunicationStepSize),
         memoryless=memoryless,
     )
+
+
+def _told(digest: Digest) -> dict[str, Field]:
+    """The texts in which this project's FMUs say what they compute with; a foreign one may mean anything by them."""
+    variables = [item for item in digest.modelVariables if item.name in (IMPLEMENTATION, FALLBACKS)]
+    return fields(digest, groups(variables, ("calculatedParameter",)), {}) if digest.fields else {}
 
 
 def _set_derivative(field: Field, order: int, calls: Calls) -> None:

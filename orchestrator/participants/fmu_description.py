@@ -66,9 +66,20 @@ class Variable(NamedTuple):
         return {} if self.declaredType is None else {int(item.value): item.name for item in self.declaredType.items}
 
 
+class CoSimulation(NamedTuple):
+    """What the master needs of the element of that name; named as in FMPy, with FMI 3.0's names as those of FMI 2.0."""
+
+    modelIdentifier: str
+    canHandleVariableCommunicationStepSize: bool
+    canInterpolateInputs: bool
+    canBeInstantiatedOnlyOncePerProcess: bool
+    canGetAndSetFMUstate: bool
+    canSerializeFMUstate: bool
+
+
 @dataclass(frozen=True)
-class Description:
-    """A model description; what FMPy has of it is named as there.
+class Described:
+    """What a participant needs of a model description; what FMPy has of it is named as there.
 
     `fields` and `memoryless` are what this project's FMUs say beyond FMI: attributes of inputs and outputs by name, and
     whether outputs follow the inputs whatever was before.
@@ -77,12 +88,18 @@ class Description:
     fmiVersion: str
     guid: str
     generationTool: str
-    coSimulation: Any
-    unitDefinitions: Sequence[Any]
-    defaultExperiment: Any
+    coSimulation: CoSimulation
     modelVariables: Sequence[Variable]
     fields: Mapping[str, Mapping[str, str]]
     memoryless: bool
+
+
+@dataclass(frozen=True)
+class Description(Described):
+    """A model description, with what a system package asks of it."""
+
+    unitDefinitions: Sequence[Any]
+    defaultExperiment: Any
 
 
 def read_description(file: FmuFile) -> Description:
@@ -116,13 +133,18 @@ def read_description(file: FmuFile) -> Description:
         version,
         head.guid or "",
         head.generationTool or "",
-        head.coSimulation,
-        head.unitDefinitions,
-        head.defaultExperiment,
+        _co_simulation(head.coSimulation),
         variables,
         _NO_FIELDS if own is None else {field.get("name"): dict(field.attrib) for field in own.iter("Field")},
         unit is not None and unit.get("memoryless") == "true",
+        head.unitDefinitions,
+        head.defaultExperiment,
     )
+
+
+def _co_simulation(declared: Any) -> CoSimulation:
+    identifier, *abilities = (getattr(declared, name) for name in CoSimulation._fields)
+    return CoSimulation(identifier or "", *map(bool, abilities))
 
 
 def _check_items(types: Mapping[str, Any]) -> None:

@@ -1,9 +1,10 @@
 """The file of an FMU: an archive, or a folder that one was unpacked to."""
 
+import hashlib
 import io
 import shutil
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -36,6 +37,16 @@ class FmuFile:
             return frozenset(path.relative_to(self._path).as_posix() for path in files)
         with open_archive(self._path) as archive:
             return archive.names
+
+    def hash(self) -> str | None:
+        """SHA-256 of the archive's bytes; None for a folder, and where they cannot be read."""
+        if self._is_folder:
+            return None
+        try:
+            with self._path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError:
+            return None
 
     def description(self) -> Any:
         """The root element of its model description."""
@@ -74,25 +85,23 @@ def _naming_description() -> Iterator[None]:
         raise InputError(f"{DESCRIPTION}: {error}") from None
 
 
-def check_binary(file: FmuFile, description: Any) -> None:
-    """InputError if the FMU has no library for this machine; it says for which ones it has."""
+def check_binary(names: Collection[str], description: Any) -> None:
+    """InputError if the FMU of the files `names` has no library for this machine; it says for which ones it has."""
     identifier = description.coSimulation.modelIdentifier
     if not identifier:
         raise InputError("its CoSimulation has no modelIdentifier, which names the library; export it anew")
     machine = fmpy.platform if description.fmiVersion == "2.0" else fmpy.platform_tuple
     library = f"binaries/{machine}/{identifier}{fmpy.sharedLibraryExtension}"
-    if library in file.names:
+    if library in names:
         return
-    machines = sorted(
-        {name.split("/")[1] for name in file.names if name.startswith("binaries/") and name.count("/") > 1}
-    )
+    machines = sorted({name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1})
     if machine in machines:
         raise InputError(f"it has no {library}, which its modelIdentifier says is its library; export it anew")
     if machines:
         raise InputError(
             f"it has no library for this platform, {machine}, only for {', '.join(machines)}; export it anew"
         )
-    if any(name.startswith("sources/") for name in file.names):
+    if any(name.startswith("sources/") for name in names):
         raise InputError(f"it has source code only, and no library for this platform, {machine}; compile it first")
     raise InputError(f"it has no library for this platform, {machine}, nor for any other; export it anew")
 

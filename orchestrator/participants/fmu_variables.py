@@ -1,6 +1,6 @@
 """What an FMU of FMI 2.0 or 3.0 declares: its fields as ports, its parameters, from the model description."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from ctypes import (
     c_bool,
     c_char_p,
@@ -20,7 +20,7 @@ from dataclasses import replace
 from itertools import product
 from math import prod
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from fmpy.fmi2 import fmi2ValueReference
@@ -28,7 +28,7 @@ from fmpy.fmi2 import fmi2ValueReference
 from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError, did_you_mean
 from ..quoting import quoted, shortened
-from .fmu_description import MOST_DIMENSIONS, Description, Variable
+from .fmu_description import MOST_DIMENSIONS, Described, Variable
 from .participant import INDEXED, Parameters, Port, Ports, Values
 
 #: How FMI calls an initial value that the caller may give.
@@ -85,7 +85,7 @@ class Field:
         self._type, self._fmi = fmi_type, fmi
         self.kind = _KINDS[fmi].get(fmi_type, fmi_type)
         # The type is the same in FMI 3.0.
-        self.references = (fmi2ValueReference * len(references))(*references)
+        self.references = (fmi2ValueReference * len(references)).from_buffer(np.array(references, np.uint32))
         self.buffer = (_CTYPES[fmi][self.kind] * self.size)()
         self._texts = self.kind == "String"
         self._numbers = None if self._texts else np.ctypeslib.as_array(self.buffer).reshape(port.shape)
@@ -188,21 +188,46 @@ def ramps_itself(variables: Iterable[Any], parameters: Parameters) -> bool:
     )
 
 
-def fields(description: Description, causalities: Sequence[str], parameters: Parameters) -> dict[str, Field]:
-    """The fields of an FMU's variables of some `causalities`, by name.
+class Group(NamedTuple):
+    """Variables that are one field: its name, first index and shape, the first of them, and all value references."""
+
+    name: str
+    base: int
+    shape: tuple[int, ...]
+    first: Variable
+    references: Sequence[int]
+
+    def elements(self) -> Iterator[str]:
+        """The names of the variables that are elements of an array; none where it is a variable by itself."""
+        if self.shape and not self.first.shape:
+            for index in product(*(range(self.base, self.base + count) for count in self.shape)):
+                yield f"{self.name}[{','.join(map(str, index))}]"
+
+
+def groups(variables: Iterable[Variable], causalities: Collection[str]) -> list[Group]:
+    """What the variables of some `causalities` are as scalars and arrays.
 
     Scalars `x[1]`, `x[2]`, … that fill an array, of indices from 1 or from 0, and are of one type and unit are taken
-    together as one field; all others are fields of their own, under their full names. A dimension given by a structural
-    parameter has that one's start value. Binaries and clocks are left out.
+    together as one field; all others are fields of their own, under their full names. Binaries and clocks are left out.
     """
-    variables = [item for item in description.modelVariables if item.causality in causalities and item.type in _TYPES]
-    fmi = int(description.fmiVersion[0])
-    found = {}
-    for name, base, shape, members in _grouped(variables):
-        port = _port(description, name, base, shape, members[0], parameters)
+    chosen = [item for item in variables if item.causality in causalities and item.type in _TYPES]
+    return [
+        Group(name, base, shape, members[0], [member.valueReference for member in members])
+        for name, base, shape, members in _grouped(chosen)
+    ]
+
+
+def fields(description: Described, found: Iterable[Group], parameters: Parameters) -> dict[str, Field]:
+    """The fields of the groups `found` in a description, by name.
+
+    A dimension given by a structural parameter has that one's start value. A field without values is left out.
+    """
+    made = {}
+    for name, base, shape, first, references in found:
+        port = _port(description, name, base, shape, first, parameters)
         if port.size:
-            found[name] = Field(port, members[0].type, [member.valueReference for member in members], fmi)
-    return found
+            made[name] = Field(port, first.type, references, int(description.fmiVersion[0]))
+    return made
 
 
 def ports(fields: Mapping[str, Field]) -> Ports:
@@ -210,20 +235,20 @@ def ports(fields: Mapping[str, Field]) -> Ports:
     return Ports({name: field.port for name, field in fields.items()})
 
 
-_Group = tuple[str, int, tuple[int, ...], list[Variable]]
+_Members = tuple[str, int, tuple[int, ...], list[Variable]]
 
 
-def _grouped(variables: Sequence[Variable]) -> Iterator[_Group]:
+def _grouped(variables: Sequence[Variable]) -> Iterator[_Members]:
     """Name, first index, shape and members of what `variables` are as scalars and arrays."""
-    groups: dict[str, list[tuple[tuple[int, ...], Variable]]] = {}
+    by_name: dict[str, list[tuple[tuple[int, ...], Variable]]] = {}
     names = {variable.name for variable in variables}
     for variable in variables:
         name = variable.name
         index: tuple[int, ...] = ()
         if name[-1] == "]" and not variable.shape and (match := INDEXED.match(name)) is not None:
             name, index = match[1], tuple(map(int, match[2].split(",")))
-        groups.setdefault(name, []).append((index, variable))
-    for name, members in groups.items():
+        by_name.setdefault(name, []).append((index, variable))
+    for name, members in by_name.items():
         if len(members) == 1 and not members[0][0]:
             # An array of FMI 3.0 is one variable, without an index.
             yield name, 1, members[0][1].shape, [members[0][1]]
@@ -252,7 +277,7 @@ def _filled(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...] | None:
 
 
 def _port(
-    description: Description, name: str, base: int, shape: tuple[int, ...], first: Variable, parameters: Parameters
+    description: Described, name: str, base: int, shape: tuple[int, ...], first: Variable, parameters: Parameters
 ) -> Port:
     extra = description.fields.get(name, {})
     needs = extra.get("needs")
@@ -276,7 +301,7 @@ def _port(
     )
 
 
-def _value(description: Description, parameter: str, parameters: Parameters) -> float:
+def _value(description: Described, parameter: str, parameters: Parameters) -> float:
     """The value of a Real parameter."""
     start = next((item.start for item in description.modelVariables if item.name == parameter), None)
     value = parameters.get(parameter, start or 0.0)

@@ -24,7 +24,7 @@ from ...units.unit import Unit
 from ...units.variable import Causality, Variable
 from ..errors import InputError, ParticipantError, did_you_mean
 from ..scenario import Scene
-from .participant import Abilities, Parameters, Port, Ports, Ramp, Values, Wait
+from .participant import Abilities, Implementation, Parameters, Port, Ports, Ramp, Values, Wait
 from .ramping import PendingRamps
 
 __all__ = [
@@ -128,9 +128,10 @@ def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Po
 
 
 def _parameter_ports(unit: str) -> Ports:
-    """The parameters of a unit, as they are recorded."""
+    """The parameters of a unit, those that it computes included, as they are recorded."""
     kinds = {float: "Real", int: "Integer", str: "String"}
-    declared = (item for item in UNITS[unit].variables() if item.causality is Causality.PARAMETER)
+    kept = (Causality.PARAMETER, Causality.CALCULATED_PARAMETER)
+    declared = (item for item in UNITS[unit].variables() if item.causality in kept)
     return Ports(
         {
             item.name: Port(
@@ -263,6 +264,10 @@ class NativeParticipant:
     def unpack(self, data: bytes) -> None:
         """See Participant."""
         self._unit.set_state(Snapshot.from_bytes(data))
+
+    def implementation(self) -> Implementation:
+        """See Participant."""
+        return Implementation(self._unit.implementation(), tuple(self._unit.fallbacks()))
 
     def log_to(self, path: Path) -> None:
         """See Participant; a unit that is called directly logs nothing."""

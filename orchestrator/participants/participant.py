@@ -161,6 +161,18 @@ class Abilities:
     memoryless: bool = False
 
 
+@dataclass(frozen=True)
+class Implementation:
+    """What a participant computes with on its machine: kernels, instruction set, linear solver.
+
+    Bits differ between those of different `text`. `fallbacks` are sentences on what is slower than it need be, each
+    with the remedy. Who says nothing of it, as foreign FMUs do not, has an empty text.
+    """
+
+    text: str = ""
+    fallbacks: tuple[str, ...] = ()
+
+
 #: Waits for the end of a step that was started, and raises what went wrong in it. Returns the seconds that the step
 #: took, where only the participant knows; None where it was done when it was started.
 Wait = Callable[[], float | None]
@@ -214,6 +226,9 @@ class Participant(Protocol):
 
     def unpack(self, data: bytes) -> None:
         """Go to the state that `pack` gave, perhaps in another process."""
+
+    def implementation(self) -> Implementation:
+        """What it computes with, once it is initialised."""
 
     def log_to(self, path: Path) -> None:
         """Write what it logs to the end of the file at `path` from now on, and what it has logged so far."""

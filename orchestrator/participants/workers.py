@@ -17,7 +17,7 @@ from distributed import Client, LocalCluster
 from distributed.actor import ActorFuture
 
 from ..errors import InputError, ParticipantError, ParticipantLost
-from .participant import Abilities, Participant, Ports, Ramp, Values, Wait
+from .participant import Abilities, Implementation, Participant, Ports, Ramp, Values, Wait
 from .recipe import Recipe
 
 #: How long to wait for a scheduler, or for an actor to be set up, in seconds.
@@ -174,6 +174,11 @@ class RemoteParticipant:
     def unpack(self, data: bytes) -> None:
         """See Participant."""
         self._call("unpack", data)
+
+    def implementation(self) -> Implementation:
+        """See Participant; of the worker's machine."""
+        told: Implementation = self._call("implementation")
+        return told
 
     def log_to(self, path: Path) -> None:
         """See Participant; the file is on the worker's machine."""

@@ -1,15 +1,16 @@
 """checkpoint.h5: all that a run needs to go on after its process has ended, in whatever way.
 
-The content is nested dictionaries of arrays and numbers, as groups and data sets. The file is written aside and put in
-place at once, so that there always is a whole one. What it costs does not grow with the run: of the other files it
-keeps how long they were, and a hash.
+The content is nested dictionaries of arrays and numbers. All their bytes are one data set, `values`, and `index` is
+the dictionaries as JSON, with type, shape and place for each array: a data set for each would take five times as long.
+The file is written aside and put in place at once, so that there always is a whole one. What it costs does not grow
+with the run: of the other files it keeps how long they were, and a hash.
 """
 
 import json
 from collections.abc import Callable, Mapping
+from math import prod
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote
 
 import h5py
 import numpy as np
@@ -19,7 +20,7 @@ from .hdf5 import reading_sealed, write_sealed
 from .names import CHECKPOINT
 from .origin import Origin
 
-_FORMAT = 2
+_FORMAT = 3
 _REMEDY = "run without --resume to begin anew"
 
 #: What a run goes on from: by part, what that kept.
@@ -42,12 +43,14 @@ class Checkpoint:
 
     def write(self) -> None:
         """Write a checkpoint of this moment, between two steps."""
-        memories = {name: memory() for name, memory in self._parts.items()}
+        values = bytearray()
+        index = _indexed({name: memory() for name, memory in self._parts.items()}, values, {})
 
         def fill(file: h5py.File) -> None:
             file.attrs["format"] = _FORMAT
             file["origin"] = json.dumps(self._origin.content())
-            _store(file.create_group("memories"), memories)
+            file["index"] = json.dumps(index)
+            file["values"] = np.frombuffer(values, np.uint8)
 
         write_sealed(self._path, fill)
 
@@ -76,7 +79,10 @@ def read_checkpoint(folder: Path, origin: Origin) -> Memories | None:
             if int(file.attrs["format"]) != _FORMAT:
                 raise ValueError("it was written by another version of this program")
             before = Origin.from_content(json.loads(file["origin"][()]))
-            memories = _load(file["memories"])
+            index = json.loads(file["index"][()])
+            if not isinstance(index, dict):
+                raise ValueError("it has no memories")
+            memories = _loaded(index, file["values"][()].tobytes())
     except FileNotFoundError:
         return None
     # What h5py raises of a file that lacks something, and what an operating system does not read.
@@ -94,21 +100,33 @@ def read_checkpoint(folder: Path, origin: Origin) -> Memories | None:
     return memories
 
 
-def _store(group: h5py.Group, memory: Mapping[str, Any]) -> None:
+def _indexed(memory: Mapping[str, Any], values: bytearray, known: dict[int, int]) -> dict[str, Any]:
+    """`memory` with type, shape and place in place of its arrays, whose bytes are added to `values`.
+
+    An array under several names is there once; `known` are the places of all so far by identity.
+    """
+    index: dict[str, Any] = {}
     for name, value in memory.items():
         if isinstance(value, Mapping):
-            _store(group.create_group(_quoted(name)), value)
-        else:
-            group[_quoted(name)] = value
+            index[name] = _indexed(value, values, known)
+            continue
+        array = np.asarray(value)
+        if array is not value or id(array) not in known:
+            known[id(array)] = len(values)
+            values += array.tobytes()
+        index[name] = [array.dtype.str, array.shape, known[id(array)]]
+    return index
 
 
-def _quoted(name: str) -> str:
-    """Names of foreign variables may have slashes, which would be groups, or be a point, which would be this group."""
-    return quote(name, safe="").replace(".", "%2E")
-
-
-def _load(group: h5py.Group) -> dict[str, Any]:
-    return {
-        unquote(name): _load(item) if isinstance(item, h5py.Group) else np.asarray(item[()])
-        for name, item in group.items()
-    }
+def _loaded(index: Mapping[str, Any], content: bytes) -> dict[str, Any]:
+    """The memory of which `_indexed` made `index` and `content`; ValueError or TypeError if it made them of none."""
+    memory: dict[str, Any] = {}
+    for name, entry in index.items():
+        if isinstance(entry, dict):
+            memory[name] = _loaded(entry, content)
+            continue
+        kind, shape, begin = entry
+        array = np.frombuffer(content, np.dtype(kind), prod(shape), begin).reshape(shape)
+        # The arrays are those of their owners from here on.
+        memory[name] = array.copy()
+    return memory

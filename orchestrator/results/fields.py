@@ -5,47 +5,51 @@ Layout of the HDF5 file: `points_mm`, `cells`, fixed fields by name (`fiber`, `s
 windows on single frames, without data of their own: what the XDMF file points to, because readers of XDMF disagree
 about hyperslabs (libxdmf3 takes the axes in reverse and shows wrong values without an error).
 
-While a run goes on, the frames lie in `fields.parts/`, a file each, and fields.h5 has the same layout with references
-to them: an HDF5 file that is being written to is not readable any more when its process is killed. In the end all is
-copied into fields.h5. Of runs with hundreds of frames it is not written anew for each, which would take a time that
-grows with the square of their number.
+While a run goes on, the frames lie in `fields.parts/`, a file each, and fields.h5 has the same layout, but for the
+views, with `frames_ms` and `frames/` mapped onto them: an HDF5 file that is being written to is not readable any more
+when its process is killed. It is written once, for HDF5 itself counts the frames that are there; the XDMF file points
+to them. In the end all is copied into fields.h5. Of runs with hundreds of frames fields.xdmf is not written anew for
+each, which would take a time that grows with the square of their number.
 """
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
+from xml.sax.saxutils import escape, quoteattr
 
 import h5py
+import numpy as np
+from h5py import h5d, h5s
 
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..participants.native import Mesh
 from ..participants.participant import Participant, Port, Values
 from ..writing import remove_stale, writing
-from .hdf5 import write_streamed
+from .hdf5 import write_mapping, write_streamed
 from .names import FIELDS, PARTS, XDMF
-from .parts import Parts
+from .parts import TIME, Parts, series
 from .whole import replacing
 
 #: How XDMF calls the elements, by dimension.
 _TOPOLOGIES = {
-    0: {"TopologyType": "Polyvertex", "NodesPerElement": "1"},
-    1: {"TopologyType": "Polyline", "NodesPerElement": "2"},
-    2: {"TopologyType": "Triangle"},
-    3: {"TopologyType": "Tetrahedron"},
+    0: 'TopologyType="Polyvertex" NodesPerElement="1"',
+    1: 'TopologyType="Polyline" NodesPerElement="2"',
+    2: 'TopologyType="Triangle"',
+    3: 'TopologyType="Tetrahedron"',
 }
 
-#: Frames that fields.h5 may lack while a run goes on, as a fraction of those it has.
+#: Frames that fields.xdmf may lack while a run goes on, as a fraction of those it has.
 _BEHIND = 0.1
 
 _CENTERS = {"node": "Node", "element": "Cell"}
 
 
 class Fields:
-    """Writes a frame at every output time; both files are complete up to the last frame, or nearly, at every moment.
+    """Writes a frame at every output time; fields.h5 is complete up to the last at every moment, fields.xdmf nearly.
 
-    `resumed` is the `memory` of an earlier run in the same folder, after whose frames this one goes on.
+    `resumed` is the `memory` of an earlier run in the same folder, after whose frames this one goes on; the
+    `participants` are initialised then.
     """
 
     def __init__(
@@ -62,9 +66,14 @@ class Fields:
         if resumed is None:
             remove_stale(self._xdmf)
         self._parts = Parts(folder / PARTS, 0 if resumed is None else int(resumed["frames"]))
-        self._fixed: dict[str, Values] = {} if resumed is None else dict(resumed.get("fixed", {}))
-        # How many frames fields.h5 has or refers to.
-        self._referred = len(self._parts.times)
+        self._fixed: dict[str, Values] = {}
+        if resumed is not None:
+            # What the units made of the same scenario again; it need not be in every checkpoint.
+            fixed = [(name, unit, port) for name, unit, port in self._named if port.fixed]
+            self._fixed = {name: participants[unit].get(port.name) for name, unit, port in fixed}
+        # Whether fields.h5 refers to the frames, and to how many fields.xdmf does.
+        self._refers = False
+        self._listed = len(self._parts.times)
         if resumed is None:
             with writing(self._path):
                 self._write(self._copy)
@@ -77,20 +86,22 @@ class Fields:
             # All values are at hand before the first is written: a unit that fails here leaves no half a frame.
             values = {name: exchange.value(unit, port.name) for name, unit, port in self._named if not port.fixed}
             self._parts.add(step.time_ms, values)
-            if len(self._parts.times) >= (1.0 + _BEHIND) * self._referred:
+            if not self._refers:
                 self._write(self._refer)
-                self._write_xdmf()
+                self._refers = True
+            if len(self._parts.times) >= (1.0 + _BEHIND) * self._listed:
+                self._write_xdmf(f"{self._parts.folder.name}/{{frame}}.h5:/{{name}}")
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""
-        return {"frames": len(self._parts.times), "fixed": self._fixed}
+        return {"frames": len(self._parts.times)}
 
     def close(self) -> None:
         """Gather all frames in fields.h5; the parts stay, to go on from a checkpoint."""
         if self._open:
             self._write(self._copy)
             if self._parts.times:
-                self._write_xdmf()
+                self._write_xdmf(f"{FIELDS}:/views/{{frame}}/{{name}}")
         self._open = False
 
     def forget(self) -> None:
@@ -99,12 +110,10 @@ class Fields:
 
     def _write(self, add_frames: Callable[[h5py.File], None]) -> None:
         """Write fields.h5 anew, with the frames added, and replace the old one by it."""
-        self._referred = len(self._parts.times)
 
         def fill(file: h5py.File) -> None:
             file["points_mm"] = self._mesh.points
             file["cells"] = self._mesh.cells
-            file["frames_ms"] = self._parts.times
             for name, values in self._fixed.items():
                 file[name] = values
             add_frames(file)
@@ -112,66 +121,73 @@ class Fields:
         write_streamed(self._path, fill)
 
     def _refer(self, file: h5py.File) -> None:
-        count = len(self._parts.times)
+        folder = self._parts.folder.name
+        series(file, "frames_ms", folder, TIME, ())
+        frames = file.create_group("frames")
         for name, shape in self._moving():
-            series = _layout((count, *shape))
-            for frame in range(count):
-                path = self._parts.path(frame)
-                reference = f"{path.parent.name}/{path.name}"
-                series[frame] = h5py.VirtualSource(reference, name, shape, "f8")
-                file[f"views/{frame}/{name}"] = h5py.ExternalLink(reference, name)
-            file.create_virtual_dataset(f"frames/{name}", series)
+            series(frames, name, folder, name, shape)
 
     def _copy(self, file: h5py.File) -> None:
+        file["frames_ms"] = self._parts.times
         count = len(self._parts.times)
+        frames = file.create_group("frames")
+        chunked = []
         for name, shape in self._moving():
-            series = file.create_dataset(
-                f"frames/{name}", (count, *shape), maxshape=(None, *shape), chunks=(1, *shape), dtype="f8"
-            )
-            for frame in range(count):
-                window = _layout(shape)
-                window[...] = h5py.VirtualSource(".", f"frames/{name}", series.shape)[frame]
-                file.create_virtual_dataset(f"views/{frame}/{name}", window)
+            whole = (count, *shape)
+            data = frames.create_dataset(name, whole, maxshape=(None, *shape), chunks=(1, *shape), dtype="f8")
+            chunked.append((name, whole, data.id))
         for frame in range(count):
+            view = file.create_group(f"views/{frame}")
             with self._parts.open(frame) as part:
-                for name, _ in self._moving():
-                    file[f"frames/{name}"][frame] = part[name][...]
+                for name, whole, data in chunked:
+                    chunk = np.empty(whole[1:])
+                    h5d.open(part.id, name.encode()).read(h5s.ALL, h5s.ALL, chunk)
+                    data.write_direct_chunk((frame, *[0] * chunk.ndim), chunk)
+                    _window(view, name, frame, whole)
 
     def _moving(self) -> list[tuple[str, tuple[int, ...]]]:
         return [(name, port.shape) for name, _, port in self._named if not port.fixed]
 
-    def _write_xdmf(self) -> None:
-        root = Element("Xdmf", Version="3.0")
-        series = SubElement(SubElement(root, "Domain"), "Grid", GridType="Collection", CollectionType="Temporal")
+    def _write_xdmf(self, place: str) -> None:
+        """Write fields.xdmf, whose changing fields lie at `place`, a format of the frame and the name."""
+        self._listed = len(self._parts.times)
+        mesh = self._mesh
+        head = [
+            f'<Topology NumberOfElements="{mesh.elements}" {_TOPOLOGIES[mesh.dimension]}>',
+            _item(f"{FIELDS}:/cells", mesh.cells.shape, "Int"),
+            "</Topology>",
+            '<Geometry GeometryType="XYZ">',
+            _item(f"{FIELDS}:/points_mm", mesh.points.shape, "Float"),
+            "</Geometry>",
+        ]
+        lines = ["<?xml version='1.0' encoding='utf-8'?>", '<Xdmf Version="3.0">', "<Domain>"]
+        lines.append('<Grid GridType="Collection" CollectionType="Temporal">')
         for frame, time in enumerate(self._parts.times):
-            grid = SubElement(series, "Grid", Name="mesh")
-            SubElement(grid, "Time", Value=repr(time))
-            elements = {"NumberOfElements": str(self._mesh.elements)}
-            topology = SubElement(grid, "Topology", elements | _TOPOLOGIES[self._mesh.dimension])
-            self._item(topology, "cells", self._mesh.cells.shape, "Int")
-            self._item(SubElement(grid, "Geometry", GeometryType="XYZ"), "points_mm", self._mesh.points.shape, "Float")
+            lines += ['<Grid Name="mesh">', f'<Time Value="{time!r}" />', *head]
             for name, _, port in self._named:
                 kind = "Scalar" if len(port.shape) == 1 else "Vector"
-                attribute = SubElement(
-                    grid, "Attribute", Name=name, AttributeType=kind, Center=_CENTERS[str(port.location)]
-                )
-                self._item(attribute, name if port.fixed else f"views/{frame}/{name}", port.shape, "Float")
-        tree = ElementTree(root)
-        indent(tree)
+                center = _CENTERS[str(port.location)]
+                lines.append(f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">')
+                where = f"{FIELDS}:/{name}" if port.fixed else place.format(frame=frame, name=name)
+                lines += [_item(where, port.shape, "Float"), "</Attribute>"]
+            lines.append("</Grid>")
+        lines += ["</Grid>", "</Domain>", "</Xdmf>", ""]
         with replacing(self._xdmf) as part:
-            tree.write(part, encoding="utf-8", xml_declaration=True)
-
-    def _item(self, parent: Element, name: str, shape: tuple[int, ...], kind: str) -> None:
-        dimensions = " ".join(map(str, shape))
-        item = SubElement(parent, "DataItem", Dimensions=dimensions, NumberType=kind, Precision="8", Format="HDF")
-        item.text = f"fields.h5:/{name}"
+            part.write_text("\n".join(lines), encoding="utf-8")
 
 
-def _layout(shape: tuple[int, ...]) -> h5py.VirtualLayout:
-    layout = h5py.VirtualLayout(shape, "f8")
-    # A run and its repetition are to be the same file: no data set remembers when it was made.
-    layout.dcpl.set_obj_track_times(False)
-    return layout
+def _item(place: str, shape: tuple[int, ...], kind: str) -> str:
+    dimensions = " ".join(map(str, shape))
+    return (
+        f'<DataItem Dimensions="{dimensions}" NumberType="{kind}" Precision="8" Format="HDF">{escape(place)}</DataItem>'
+    )
+
+
+def _window(group: h5py.Group, name: str, frame: int, shape: tuple[int, ...]) -> None:
+    """Add the data set `name` to `group`: one frame of the series of that name and `shape`, without data of its own."""
+    source = h5s.create_simple(shape)
+    source.select_hyperslab((frame, *[0] * (len(shape) - 1)), (1, *shape[1:]))
+    write_mapping(group, name, h5s.create_simple(shape[1:]), ".", f"/frames/{name}".replace("%", "%%"), source)
 
 
 def _named(participants: Mapping[str, Participant]) -> list[tuple[str, str, Port]]:

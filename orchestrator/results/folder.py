@@ -3,7 +3,7 @@
 import csv
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import TracebackType
@@ -11,6 +11,7 @@ from typing import Any
 
 from ..assembly import Assembly
 from ..errors import InputError
+from ..participants.participant import Implementation
 from ..wall_clock import WallClock
 from ..writing import allowed, remove_stale, writing
 from .checkpoint import Memories, read_checkpoint
@@ -90,7 +91,13 @@ class ResultsFolder:
                 f"{_REMEDY}"
             ) from error
 
-    def record(self, assembly: Assembly, before: Memories | None, wall: WallClock) -> Recording:
+    def record(
+        self,
+        assembly: Assembly,
+        before: Memories | None,
+        wall: WallClock,
+        implementations: Mapping[str, Implementation],
+    ) -> Recording:
         """Open the files of a run, or go on with those of one that left `before`; see Recording."""
         self._check_places()
         if before is not None:
@@ -101,7 +108,7 @@ class ResultsFolder:
         try:
             with writing(self.path / SUMMARY):
                 reserve(self.path / SUMMARY, _RESERVE)
-            return self._opened(assembly, before, wall)
+            return self._opened(assembly, before, wall, implementations)
         except BaseException:
             with suppress(OSError):
                 self._remove_leftovers()
@@ -109,7 +116,13 @@ class ResultsFolder:
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
-    def _opened(self, assembly: Assembly, before: Memories | None, wall: WallClock) -> Recording:
+    def _opened(
+        self,
+        assembly: Assembly,
+        before: Memories | None,
+        wall: WallClock,
+        implementations: Mapping[str, Implementation],
+    ) -> Recording:
         # First what would let the rest pass for the result of an earlier run.
         remove_stale(self.path / SUMMARY)
         if before is None:
@@ -123,7 +136,7 @@ class ResultsFolder:
             with writing(self.path / PARTS):
                 self._remove_parts()
         with allowed(self.path, "--output"), nullcontext() if before is None else self.fitting():
-            return Recording(self.path, self._origin, assembly, before, wall)
+            return Recording(self.path, self._origin, assembly, before, wall, implementations)
 
     def _check_places(self) -> None:
         """InputError where something is in the way of a file, before any is touched."""

@@ -3,26 +3,28 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
 from typing import Any
 
 from ..scenario import Scenario
 
-#: Whose versions the bits of a run may depend on.
+#: Whose versions the bits of a run may depend on; those that are not installed are not used.
 _PACKAGES = (
     "cardiac-cosim",
     "fmpy",
     "gmsh",
     "h5py",
     "meshio",
-    "networkx",
     "numpy",
+    "pyamg",
     "pythonfmu",
     "pythonfmu3",
+    "rslab",
     "scikit-fem",
     "scipy",
 )
@@ -51,7 +53,7 @@ class Origin:
         # As it comes back from a file.
         resolved = json.loads(json.dumps(scenario.resolved()))
         files = {name: _hash(base / name) for name in scenario.files()}
-        versions = {"python": python_version(), **{name: version(name) for name in _PACKAGES}}
+        versions = {"python": python_version(), **_versions()}
         return cls(resolved, files, _program(), versions)
 
     @classmethod
@@ -91,6 +93,15 @@ class Origin:
         if earlier.program != self.program and not found:
             found.append("this program has changed since; take the version that began the run")
         return found
+
+
+@cache
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _PACKAGES:
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def _counted(name: str, version: str) -> str:

@@ -1,8 +1,9 @@
 """A run on its way into its folder: all that is written of it, in the order in which a process may end anywhere."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -11,7 +12,9 @@ from ..assembly import Assembly
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..errors import InputError, Interrupted, RunError, Terminated
+from ..participants.participant import Implementation
 from ..wall_clock import WallClock
+from . import implementation
 from .appended import check
 from .checkpoint import Checkpoint, Memories
 from .coupling_log import CouplingLog, stretches
@@ -46,6 +49,8 @@ class Recording:
     ----------
     before:
         What an earlier process left in the same folder to go on from.
+    implementations:
+        What the units compute with; empty where they could not be initialised.
 
     Attributes
     ----------
@@ -60,12 +65,14 @@ class Recording:
         assembly: Assembly,
         before: Memories | None,
         wall: WallClock,
+        implementations: Mapping[str, Implementation],
     ) -> None:
         self.summary: dict[str, Any] = {}
         self._refusal: RunError | None = None
         self._folder, self._origin, self._assembly = folder, origin, assembly
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
         self._wall = wall
+        self._implementations = implementations
         self._fields: Fields | None = None
         self._iterations: IterationLog | None = None
         # The fields first: a value that is not finite ends the step before the time series has a row of it.
@@ -95,6 +102,7 @@ class Recording:
             participant.log_to((folder / FMU_LOG).absolute())
         self._recorders = recorders
         memories = {"master": master.memory, "wall": self._wall.memory}
+        memories["implementation"] = partial(implementation.memory, implementations)
         memories |= {name: recorder.memory for name, recorder in recorders.items()}
         self._checkpoint = Checkpoint(folder, origin, memories)
         self._every = scenario.run.checkpoint_every
@@ -149,7 +157,8 @@ class Recording:
             "unconverged_ms": self._log.unconverged,
             "tolerance_missed": asdict(self._assembly.master.missed),
             "resumable": resumable,
-            "warnings": list(self._assembly.warnings),
+            "warnings": [*self._assembly.warnings, *implementation.fallbacks(self._implementations.values())],
+            "implementation": implementation.texts(self._implementations),
         }
         scenario, seconds = self._assembly.scenario, self._wall.seconds()
         path = self._folder / SUMMARY

@@ -32,7 +32,7 @@ def reserve(path: Path, size: int) -> None:
     unfinished(path).write_bytes(bytes(size))
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes | bytearray) -> None:
     """Put a file of this `content` in the place of what is at `path`."""
     with replacing(path) as part, part.open("r+b" if part.exists() else "wb") as file:
         file.write(content)

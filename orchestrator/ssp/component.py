@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import InputError
 from ..participants.fmu_description import Description, read_description
 from ..participants.fmu_file import FmuFile
-from ..participants.fmu_variables import fields
+from ..participants.fmu_variables import fields, groups
 from ..participants.participant import Port
 from ..quoting import shortened
 from .file import inside, named
@@ -55,7 +55,7 @@ class SystemComponent:
         return {
             scalar: (field.port, place)
             for causality in ("input", "output")
-            for field in fields(self.description, (causality,), {}).values()
+            for field in fields(self.description, groups(self.description.modelVariables, (causality,)), {}).values()
             for place, scalar in enumerate(field.port.elements)
         }
 

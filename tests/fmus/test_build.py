@@ -2,6 +2,7 @@
 
 import io
 import random
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -127,7 +128,9 @@ def test_a_damaged_fmu_in_the_cache_is_built_anew(tiny: Mesh, tmp_path: Path) ->
         path.write_bytes(content)
         assert cache.cached_fmu(_UNIT, tiny, tmp_path) == path
         assert path.read_bytes() == good
-    assert [member.name for member in path.parent.iterdir()] == [path.name]
+        # Once it was found to be whole, a hash says so; that of an earlier file says nothing of this one.
+        assert cache.cached_fmu(_UNIT, tiny, tmp_path) == path
+    assert {member.name for member in path.parent.iterdir()} == {path.name, "active_stress.sha256"}
 
 
 def test_without_a_home_nothing_is_built_where_the_person_is(
@@ -307,3 +310,19 @@ def test_nothing_is_written_into_the_package(tiny: Mesh, tmp_path: Path) -> None
     build.build_fmu(_UNIT, tiny, tmp_path / "new" / "folder" / "x.fmu")
     assert files() == before
     assert [path.name for path in (tmp_path / "new" / "folder").iterdir()] == ["x.fmu"]
+
+
+def test_kernels_that_were_compiled_are_carried_and_make_another_fmu(
+    tiny: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    floor = tmp_path / "units"
+    shutil.copytree(Path(registry.__file__).parent, floor, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(build.registry, "__file__", str(floor / "registry.py"))
+    before = build.fingerprint(_UNIT, tiny)
+    (floor / "mechanics" / "kernels.abi3.so").write_bytes(b"\x7fELF 1")
+    one = build.fingerprint(_UNIT, tiny)
+    with zipfile.ZipFile(build.build_fmu(_UNIT, tiny, tmp_path / "a.fmu")) as archive:
+        (kernels,) = (name for name in archive.namelist() if name.endswith("kernels.abi3.so"))
+        assert archive.read(kernels) == b"\x7fELF 1"
+    (floor / "mechanics" / "kernels.abi3.so").write_bytes(b"\x7fELF 2")
+    assert len({before, one, build.fingerprint(_UNIT, tiny)}) == 3

@@ -11,6 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 from cardiac_cosim.fmus.model_description import model_description
+from cardiac_cosim.units.active_stress import ActiveStress
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.registry import UNITS
 from cardiac_cosim.units.variable import Causality
@@ -30,12 +31,14 @@ _SI = {
     "1/mV": ((-1, -2, 3, 1, 0), 1 / 1e-3),
     "kPa": ((1, -1, -2, 0, 0), 1e3),
     "MPa": ((1, -1, -2, 0, 0), 1e6),
+    "kPa/mm": ((1, -2, -2, 0, 0), 1e3 / 1e-3),
     # Pa/V: (kg m-1 s-2) / (kg m2 s-3 A-1)
     "MPa/mV": ((0, -3, 1, 1, 0), 1e6 / 1e-3),
 }
 
 # The unit of measure that the end of a parameter's name promises.
 _SUFFIXES = {
+    "_kPa_per_mm": ("kPa/mm",),
     "_per_mV": ("1/mV", "MPa/mV"),
     "_per_ms": ("1/ms", "mm2/ms"),
     "_mV": ("mV",),
@@ -46,6 +49,8 @@ _SUFFIXES = {
 }
 
 _TIMES = {"ms"}
+
+_CALCULATED = ["implementation", "fallbacks"]
 
 
 def _root(path: Path) -> etree._Element:
@@ -74,7 +79,8 @@ def test_fmpy_accepts_the_baseline_heart(unit: str, baseline: Mesh, baseline_fmu
     description = fmpy.read_model_description(
         str(baseline_fmus[unit]), validate=True, validate_variable_names=False, validate_model_structure=True
     )
-    assert sum(1 for _ in _outputs(unit, baseline)) == len(description.outputs) == len(description.initialUnknowns)
+    count = sum(1 for _ in _outputs(unit, baseline))
+    assert (len(description.outputs), len(description.initialUnknowns)) == (count, count + len(_CALCULATED))
 
 
 def test_the_schema_of_fmi_2(unit: str, fmus: dict) -> None:
@@ -152,11 +158,15 @@ def test_parameters_say_what_they_are(unit: str, fmus: dict) -> None:
             assert float(variable.min) == declared[name].at_least
 
 
-def test_a_start_value_keeps_all_its_digits(tiny: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
-    kind = UNITS["active_stress"]
-    potential, *others = kind.fields
-    monkeypatch.setattr(kind, "fields", (replace(potential, start=-100.0 / 3.0), *others))
-    root = etree.fromstring(model_description(kind, tiny, "{0}", "a test").encode())
+def test_a_start_value_keeps_all_its_digits(tiny: Mesh) -> None:
+    potential, *others = ActiveStress.fields
+
+    class Other(ActiveStress):
+        """Another."""
+
+        fields = (replace(potential, start=-100.0 / 3.0), *others)
+
+    root = etree.fromstring(model_description(Other, tiny, "{0}", "a test").encode())
     (start,) = root.xpath("//ScalarVariable[@name='potential[1]']/Real/@start")
     assert float(start) == -100.0 / 3.0
 
@@ -171,11 +181,20 @@ def test_inputs_have_start_values_and_fixed_ones_are_discrete(unit: str, fmus: d
             assert variable.variability == ("discrete" if declared.fixed else "continuous")
 
 
-def test_outputs_and_initial_unknowns_are_exactly_the_outputs(unit: str, tiny: Mesh, fmus: dict) -> None:
+def test_outputs_are_exactly_the_outputs_and_initial_unknowns_all_that_is_computed(
+    unit: str, tiny: Mesh, fmus: dict
+) -> None:
     description = fmpy.read_model_description(str(fmus[unit]), validate=False)
     expected = list(_outputs(unit, tiny))
     assert [unknown.variable.name for unknown in description.outputs] == expected
-    assert [unknown.variable.name for unknown in description.initialUnknowns] == expected
+    assert [unknown.variable.name for unknown in description.initialUnknowns] == [*expected, *_CALCULATED]
+
+
+def test_what_a_unit_computes_with_is_calculated_once(unit: str, fmus: dict) -> None:
+    description = fmpy.read_model_description(str(fmus[unit]), validate=False)
+    found = [item for item in description.modelVariables if item.name in _CALCULATED]
+    kinds = {(item.type, item.causality, item.variability, item.initial, item.start) for item in found}
+    assert (len(found), kinds) == (2, {("String", "calculatedParameter", "fixed", "calculated", None)})
 
 
 def test_fibres_depend_on_nothing(fmus: dict) -> None:

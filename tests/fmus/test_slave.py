@@ -109,7 +109,7 @@ def test_scalar_by_scalar_in_any_order(case: Any, fmus: dict, drive: Drive) -> N
 def test_inputs_and_parameters_read_back(case: Any, fmus: dict, drive: Drive) -> None:
     driver = drive(fmus[case.unit])
     for variable in driver.description.modelVariables:
-        if variable.causality != "output":
+        if variable.causality in ("input", "parameter"):
             (value,) = getattr(driver.fmu, f"get{variable.type}")([variable.valueReference])
             read = value.decode() if isinstance(value, bytes) else value
             assert read == {"Real": float, "Integer": int, "String": str}[variable.type](variable.start)

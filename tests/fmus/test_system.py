@@ -15,6 +15,7 @@ from cardiac_cosim.fmus.system import Component, Link, System
 from cardiac_cosim.units.errors import InvalidInput
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.registry import UNITS
+from cardiac_cosim.units.variable import Causality
 from lxml import etree
 
 _OSP = {"osp": "http://opensimulationplatform.com/MSMI/OSPSystemStructure"}
@@ -22,7 +23,7 @@ _GROUPS = {"osp": "https://open-simulation-platform.com/OspModelDescription/1.0.
 
 
 def _component(name: str, unit: str, fmu: Path, mesh: Mesh, **given: Any) -> Component:
-    shapes: dict[str, dict[str, tuple[int, ...]]] = {"input": {}, "output": {}, "parameter": {}}
+    shapes: dict[str, dict[str, tuple[int, ...]]] = {each.value: {} for each in Causality}
     for run in layout(UNITS[unit], mesh):
         shapes[run.variable.causality.value][run.variable.name] = run.shape
     return Component(name, fmu, shapes["input"], shapes["output"], given)

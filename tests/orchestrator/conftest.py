@@ -15,7 +15,15 @@ from cardiac_cosim.orchestrator.coupling.master import Master
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
 from cardiac_cosim.orchestrator.coupling.timeline import Timeline
 from cardiac_cosim.orchestrator.errors import ParticipantError, RunError
-from cardiac_cosim.orchestrator.participants.participant import Abilities, Port, Ports, Ramp, Values, Wait
+from cardiac_cosim.orchestrator.participants.participant import (
+    Abilities,
+    Implementation,
+    Port,
+    Ports,
+    Ramp,
+    Values,
+    Wait,
+)
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import Scenario
 
@@ -97,6 +105,9 @@ class Fake:
         begins = [self._in | {name: ramp.begin for name, ramp in ramps.items()}] if self.ramps else []
         self._take(self.law(self._in, self._out, time, size, *begins))
         return lambda: None
+
+    def implementation(self) -> Implementation:
+        return Implementation()
 
     @property
     def abilities(self) -> Abilities:

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.participants.participant import Values
-from cardiac_cosim.orchestrator.results.figures import draw_figures
+from cardiac_cosim.orchestrator.results.figures.draw import draw_figures
 from cardiac_cosim.orchestrator.results.figures.fiber_layout import fiber_lines, helix_angle
 from cardiac_cosim.orchestrator.results.figures.heart_potential import chosen_frames
 from cardiac_cosim.orchestrator.results.figures.scene import View, shaded, strokes

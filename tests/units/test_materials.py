@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from cardiac_cosim.units.mechanics.kinematics import Kinematics, cofactors, determinant, voigt
+from cardiac_cosim.units.mechanics.laws.guccione import Guccione
 from cardiac_cosim.units.mechanics.laws.holzapfel_fiber import HolzapfelFiber
 from cardiac_cosim.units.mechanics.laws.neo_hooke import NeoHooke
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 _FIBER = np.array([0.6, -0.48, 0.64])
@@ -16,6 +18,8 @@ _LAWS = {
     "neo_hooke": NeoHooke(),
     "neo_hooke as the seed prints it": NeoHooke(neo_hooke_log_sign="seed"),
     "fiber": HolzapfelFiber(),
+    "guccione": Guccione(),
+    "guccione, isotropic": Guccione(0.01, guccione_fiber=1.0, guccione_transverse=1.0, guccione_shear=1.0),
 }
 
 
@@ -101,17 +105,18 @@ def test_rotating_the_deformed_tissue_changes_nothing(law, gradient: np.ndarray)
     np.testing.assert_allclose(law.tangent(_at(turned)), law.tangent(_at(gradient)), rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.parametrize("law", [HolzapfelFiber(), Guccione()])
 @pytest.mark.parametrize("gradient", _gradients(True))
-def test_turning_tissue_and_load_together_turns_the_stress(gradient: np.ndarray) -> None:
+def test_turning_tissue_and_load_together_turns_the_stress(law, gradient: np.ndarray) -> None:
     turn = Rotation.random(rng=11).as_matrix()
-    stress = HolzapfelFiber().stress(_at(gradient))[0]
-    turned = HolzapfelFiber().stress(_at(gradient @ turn.T, turn @ _FIBER))[0]
+    stress = law.stress(_at(gradient))[0]
+    turned = law.stress(_at(gradient @ turn.T, turn @ _FIBER))[0]
     np.testing.assert_allclose(turned, turn @ stress @ turn.T, rtol=1e-9, atol=1e-14)
 
 
 def test_energies_are_zero_and_stress_free_at_rest() -> None:
     rest = _at(np.eye(3), np.array([1.0, 0.0, 0.0]))
-    for law in (NeoHooke(), HolzapfelFiber()):
+    for law in (NeoHooke(), HolzapfelFiber(), Guccione()):
         assert law.energy(rest)[0] == 0.0
         assert not law.stress(rest).any()
 
@@ -144,6 +149,52 @@ def test_stresses_by_hand() -> None:
     assert HolzapfelFiber().energy(at)[0] == pytest.approx(0.001685 / 31.558 * np.expm1(15.779 * extension**2))
 
 
+def test_the_exponent_of_guccione_is_the_published_sum_over_the_strains() -> None:
+    # As Land et al. 2015 print it, in the axes of fibre, sheet and normal, here along x, y and z.
+    random = np.random.default_rng(12)
+    for _ in range(5):
+        gradient = np.eye(3) + random.uniform(-0.2, 0.2, (3, 3))
+        at, ratio = _at(gradient, np.array([1.0, 0.0, 0.0])), np.linalg.det(gradient)
+        (ff, fs, fn), (sf, ss, sn), (nf, ns, nn) = 0.5 * (gradient.T @ gradient - np.eye(3))
+        exponent = 8.0 * ff**2 + 2.0 * (ss**2 + nn**2 + sn**2 + ns**2) + 4.0 * (fs**2 + sf**2 + fn**2 + nf**2)
+        energy = 0.001 * (np.exp(exponent) - 1.0) + 0.125 * (ratio**2 - 1.0 - 2.0 * np.log(ratio))
+        assert Guccione().energy(at)[0] == pytest.approx(energy, rel=1e-12)
+
+
+def test_guccione_by_hand_in_stretch_and_in_shear() -> None:
+    # F = diag(1.2, 1, 1), fibre along x or y: E_11 = 0.22, Q = b E_11², S_11 = C b E_11 exp Q + κ/2 (J² − 1)/J².
+    for fiber, share in ((np.array([1.0, 0.0, 0.0]), 8.0), (np.array([0.0, 1.0, 0.0]), 2.0)):
+        stress = Guccione().stress(_at(np.diag([1.2, 1.0, 1.0]), fiber))[0]
+        assert stress[0, 0] == pytest.approx(0.002 * share * 0.22 * np.exp(share * 0.22**2) + 0.25 * 0.44 / 1.44)
+        assert stress[1, 1] == pytest.approx(0.25 * 0.44)
+        assert stress[2, 2] == pytest.approx(0.25 * 0.44)
+    # Small shears, J = 1 to first order: S_12 = C b_fs E_12 where the fibre is along x, C b_t E_12 where along z.
+    slide = np.eye(3)
+    slide[0, 1] = 2e-6
+    for fiber, share in ((np.array([1.0, 0.0, 0.0]), 4.0), (np.array([0.0, 0.6, 0.8]), 4.0 * 0.36 + 2.0 * 0.64)):
+        assert Guccione().stress(_at(slide, fiber))[0][0, 1] == pytest.approx(0.002 * share * 1e-6, rel=1e-5)
+
+
+def test_stretch_of_an_incompressible_strip_along_its_fibre_is_the_closed_form() -> None:
+    # No stress across and J = 1: σ_11 = λ² S_e11 − S_e22/λ with E = (λ² − 1)/2 and (1/λ − 1)/2. By the penalty the
+    # volume gives way by what the pressure, λ⁻¹ S_e22, does to it, and the stress comes near at first order in 1/κ.
+    stretch = 1.3
+    along, across = 0.5 * (stretch**2 - 1.0), 0.5 * (1.0 / stretch - 1.0)
+    growth = 0.002 * np.exp(8.0 * along**2 + 4.0 * across**2)
+    exact = growth * (stretch**2 * 8.0 * along - 2.0 * across / stretch)
+    errors = []
+    for bulk in (1.0, 4.0, 16.0):
+        law = Guccione(guccione_bulk_modulus_MPa=bulk)
+
+        def stress(width: float, law: Guccione = law) -> np.ndarray:
+            return law.stress(_at(np.diag([stretch, width, width]), np.array([1.0, 0.0, 0.0])))[0]
+
+        width = brentq(lambda given: stress(given)[1, 1], 0.8, 0.95, xtol=1e-14)
+        errors.append(abs(stretch * stress(width)[0, 0] / width**2 - exact))
+    assert errors[0] < 0.01 * exact
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.1)
+
+
 @pytest.mark.parametrize("gradient", _gradients(False))
 def test_slack_fibre_carries_nothing(gradient: np.ndarray) -> None:
     fiber, at = HolzapfelFiber(), _at(gradient)
@@ -168,7 +219,7 @@ def test_fibre_stress_is_continuous_where_it_goes_slack_and_its_tangent_jumps() 
     assert not fiber.tangent(at(1.0 - 1e-7)).any()
 
 
-@pytest.mark.parametrize("law", [NeoHooke(), HolzapfelFiber()])
+@pytest.mark.parametrize("law", [NeoHooke(), HolzapfelFiber(), Guccione()])
 def test_elements_do_not_see_each_other(law) -> None:
     gradients = np.array(_gradients(True) + _gradients(False))
     together = law.stress(_at(gradients)), law.tangent(_at(gradients)), law.energy(_at(gradients))

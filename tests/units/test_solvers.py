@@ -4,7 +4,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from cardiac_cosim.units.errors import InvalidInput
+from cardiac_cosim.units.errors import InvalidInput, StepFailure
 from cardiac_cosim.units.fiber_generator import FiberGenerator
 from cardiac_cosim.units.mechanics import Mechanics
 from cardiac_cosim.units.mechanics.bulk import Tissue
@@ -14,6 +14,7 @@ from cardiac_cosim.units.mechanics.loads.active_stress import ActiveShares
 from cardiac_cosim.units.mechanics.solid import Solid
 from cardiac_cosim.units.mechanics.solvers import choice
 from cardiac_cosim.units.mechanics.solvers.choice import LinearSolver
+from cardiac_cosim.units.mechanics.solvers.factored import NotConverged
 from cardiac_cosim.units.mechanics.solvers.factorisation import NotFactorised
 from cardiac_cosim.units.mechanics.solvers.predictor import predicted
 from cardiac_cosim.units.mechanics.stiffness import Stiffness
@@ -182,6 +183,23 @@ def test_step_from_a_saved_state_repeats_its_bits_with_other_factors_at_hand(hea
     assert [step(unit, number) for number in range(4, 9)] == ends
     other.set_state(other.deserialize(unit.serialize(saved)))
     assert [step(other, number) for number in range(4, 9)] == ends
+
+
+def test_newtons_method_takes_over_and_stops_where_it_is_told(
+    heart: Mesh, started, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A safeguard that never ran, or ran for ever, would be found on the day that it is needed.
+    def fails(*_: object) -> None:
+        raise NotConverged("not today")
+
+    fibers = started(FiberGenerator, heart)
+    directions = {name: fibers.get(name) for name in ("fiber", "sheet")}
+    expected = started(Mechanics, heart, active_stress=np.full(heart.nodes, 100.0), **directions)
+    monkeypatch.setattr("cardiac_cosim.units.mechanics.solvers.quasi_newton.QuasiNewton.solve", fails)
+    found = started(Mechanics, heart, active_stress=np.full(heart.nodes, 100.0), **directions)
+    np.testing.assert_allclose(found.get("displacement"), expected.get("displacement"), rtol=0.0, atol=1e-5)
+    with pytest.raises(StepFailure, match="after 1 iterations"):
+        started(Mechanics, heart, {"newton_iterations": 1}, active_stress=np.full(heart.nodes, 100.0), **directions)
 
 
 def test_equilibrium_costs_no_newton_steps_in_a_beat(contraction, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,17 @@ static inline void VARIANT(add_scaled)(const double *factor, const double (*tens
         LANE stress[c][l] += factor[l] * tensor[c][l];
 }
 
+/* Adds f (A B + B A) to a symmetric tensor. */
+static inline void VARIANT(add_products)(double factor, const double (*left)[LANES], const double (*right)[LANES],
+                                         double (*sum)[LANES])
+{
+    for (int c = 0; c < VOIGT; c++)
+        for (int k = 0; k < 3; k++) {
+            int ik = VOIGT_OF[VOIGT_ROW[c]][k], kj = VOIGT_OF[k][VOIGT_COLUMN[c]];
+            LANE sum[c][l] += factor * (left[ik][l] * right[kj][l] + right[ik][l] * left[kj][l]);
+        }
+}
+
 /* Adds f A(x)A to the tangent. */
 static inline void VARIANT(add_dyad)(const double *factor, const double (*tensor)[LANES], double (*tangent)[LANES])
 {

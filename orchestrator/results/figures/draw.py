@@ -1,12 +1,13 @@
 """All figures of a results folder."""
 
-from collections.abc import Callable
+import io
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..whole import replacing
+from ..whole import write_whole
 from .fiber_layout import fiber_layout
 from .heart_potential import heart_potential
 from .lines import cavity_volumes, probe_potential
@@ -23,8 +24,21 @@ FIGURES: dict[str, Callable[[StoredRun], Figure | None]] = {
 _DOTS_PER_INCH = 160
 
 
-def draw_figures(folder: Path) -> list[Path]:
+#: Those that show only what does not change over a run.
+_STILL = ("fiber_layout",)
+
+
+def draw_still(folder: Path) -> dict[str, bytes]:
+    """The pictures of what does not change over the run in `folder`, by name, as far as there is data for them."""
+    run = StoredRun(folder)
+    figures = {name: FIGURES[name](run) for name in _STILL}
+    return {name: _picture(figure) for name, figure in figures.items() if figure is not None}
+
+
+def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list[Path]:
     """Draw every figure that the results in `folder` have the data for; returns the files in `folder`/figures.
+
+    `still` are pictures that were drawn when the run began.
 
     A figure without data is skipped, and its file from an earlier run in the same folder is removed: what lies in
     `figures` always belongs to the results next to it.
@@ -33,13 +47,21 @@ def draw_figures(folder: Path) -> list[Path]:
     drawn = []
     for name, draw in FIGURES.items():
         path = folder / "figures" / f"{name}.png"
-        figure = draw(run)
-        if figure is None:
+        picture = None if still is None else still.get(name)
+        if picture is None:
+            figure = draw(run)
+            picture = None if figure is None else _picture(figure)
+        if picture is None:
             path.unlink(missing_ok=True)
             continue
         path.parent.mkdir(exist_ok=True)
-        FigureCanvasAgg(figure)
-        with replacing(path) as part:
-            figure.savefig(part, format="png", dpi=_DOTS_PER_INCH)
+        write_whole(path, picture)
         drawn.append(path)
     return drawn
+
+
+def _picture(figure: Figure) -> bytes:
+    FigureCanvasAgg(figure)
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=_DOTS_PER_INCH)
+    return content.getvalue()

@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from scipy.spatial import cKDTree
 
-from ...participants.native import Mesh
 from ...participants.participant import Values
 from .scene import Painted, View, add_scale_bar, pen, shaded, show, strokes
-from .stored_run import StoredRun
+from .stored_run import Body, StoredRun
 from .surface import Numbers, normals, section, sharp_edges, smoothing, surface
 
 # Least distance, length and width of the fibre lines relative to the size of the body.
@@ -40,7 +39,7 @@ def fiber_layout(run: StoredRun) -> Figure | None:
     limit = float(np.clip(30.0 * np.ceil(np.percentile(np.abs(angle), 98.0) / 30.0), 30.0, 90.0))
     colors = ScalarMappable(Normalize(-limit, limit), "coolwarm")
 
-    body = _Body(mesh, fiber, angle, colors)
+    body = _Painter(mesh, fiber, angle, colors)
     views = []
     for _, azimuth, elevation, away, at in _SCENES:
         along = mesh.points @ np.array(away)
@@ -49,7 +48,7 @@ def fiber_layout(run: StoredRun) -> Figure | None:
     extents = [view.extent(np.concatenate([mesh.points, rim])) for view, rim in zip(views, rims, strict=True)]
     half = max(half for _, half in extents)
     figure = Figure(figsize=(10.0, 3.4), layout=ConstrainedLayoutEngine(h_pad=0.08))
-    axes = figure.subplots(1, len(_SCENES), subplot_kw={"projection": "3d"})
+    axes = figure.subplots(1, len(_SCENES))
     for axis, (title, *_), view, (middle, _) in zip(axes, _SCENES, views, extents, strict=True):
         show(axis, view, [body.painted(view)], middle, half)
         axis.set_title(title, fontsize=11)
@@ -114,17 +113,17 @@ def fiber_lines(corners: Values, directions: Values, spacing_mm: float, length_m
     return centres[face, None] + 0.5 * length_mm * np.array([[-1.0], [1.0]]) * along[:, None], face
 
 
-def _from_axis(mesh: Mesh) -> Values:
+def _from_axis(mesh: Body) -> Values:
     """Horizontal directions away from the vertical axis through the body: outward, where no sheets say it better."""
     away = mesh.centroids - np.average(mesh.centroids, axis=0, weights=mesh.volumes)
     away[:, 2] = 0.0
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12))
 
 
-class _Body:
+class _Painter:
     """The mesh with all that is the same in every view."""
 
-    def __init__(self, mesh: Mesh, fiber: Values, angle: Values, colors: ScalarMappable) -> None:
+    def __init__(self, mesh: Body, fiber: Values, angle: Values, colors: ScalarMappable) -> None:
         self._mesh, self._angle, self._colors = mesh, angle, colors
         self._size = float(np.ptp(mesh.points, axis=0).max())
         self.faces, element = surface(mesh.cells)

@@ -61,7 +61,7 @@ def heart_potential(run: StoredRun) -> Figure | None:
     figure = Figure(
         figsize=(panel * columns + _BAR_WIDTH, (panel + 0.2) * rows + 0.4), layout=ConstrainedLayoutEngine(h_pad=0.08)
     )
-    axes = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "3d"}).ravel()
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for axis in axes[len(frames) :]:
         axis.set_axis_off()
     for axis, frame, points, values in zip(axes, frames, places, potential, strict=False):

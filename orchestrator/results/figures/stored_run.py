@@ -1,14 +1,47 @@
 """Read back what a run left in its results folder: fields.h5 and timeseries.csv."""
 
 import csv
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
-from ...participants.native import Mesh
 from ...participants.participant import Values
+
+
+@dataclass(frozen=True)
+class Body:
+    """The undeformed tetrahedra: `points` in mm, shape (nodes, 3), and the nodes of `cells`, shape (elements, 4).
+
+    What the units check of their mesh is not checked again, and their floor need not be loaded for it.
+    """
+
+    points: Values
+    cells: NDArray[np.int64]
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.points)
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return len(self.cells)
+
+    @cached_property
+    def centroids(self) -> Values:
+        """Of the elements, in mm, shape (elements, 3)."""
+        return np.asarray(self.points[self.cells].mean(axis=1))
+
+    @cached_property
+    def volumes(self) -> Values:
+        """Of the elements, in mm³, shape (elements,)."""
+        edges = self.points[self.cells[:, 1:]] - self.points[self.cells[:, :1]]
+        return np.asarray(np.linalg.det(edges) / 6.0)
 
 
 class StoredRun:
@@ -17,7 +50,7 @@ class StoredRun:
     Attributes
     ----------
     mesh:
-        The undeformed tetrahedra, without named boundaries; None without fields.h5 and for scenes of other elements.
+        The undeformed body; None without fields.h5 and for scenes of other elements.
     frames_ms:
         Times of the stored frames, shape (frames,).
     columns:
@@ -29,13 +62,13 @@ class StoredRun:
         self._series = folder / "timeseries.csv"
 
     @cached_property
-    def mesh(self) -> Mesh | None:
+    def mesh(self) -> Body | None:
         """See the class."""
         points, cells = self._read("points_mm"), self._read("cells")
         # The figures in space are of solids.
         if points is None or cells is None or cells.shape[1] != 4:
             return None
-        return Mesh(points, cells.astype(np.int64))
+        return Body(points, cells.astype(np.int64))
 
     @cached_property
     def frames_ms(self) -> Values:

@@ -49,7 +49,8 @@ def test_the_variables_are_those_of_the_declaration(unit: str, tiny: Mesh, fmus3
         assert found.shape == meant.shape(tiny)
         assert found.description == meant.description
         assert found.unit == (meant.unit if found.type == "Float64" else None)
-        assert (found.start is None) == (meant.causality is Causality.OUTPUT)
+        computed = meant.causality in (Causality.OUTPUT, Causality.CALCULATED_PARAMETER)
+        assert (found.start is None) == computed
         # What is read is the declared value to the last bit.
         assert found.start is None or type(meant.start)(found.start) == meant.start
         assert found.min is None or float(found.min) == meant.at_least

@@ -21,7 +21,7 @@ from cardiac_cosim.orchestrator.build import build_fmus, write_package
 from cardiac_cosim.orchestrator.errors import InputError
 from cardiac_cosim.orchestrator.participants.fmu_description import read_description
 from cardiac_cosim.orchestrator.participants.fmu_file import FmuFile
-from cardiac_cosim.orchestrator.participants.fmu_variables import fields
+from cardiac_cosim.orchestrator.participants.fmu_variables import fields, groups
 from cardiac_cosim.orchestrator.scenario import load_scenario
 from cardiac_cosim.orchestrator.ssp import open_package
 from cardiac_cosim.units.active_stress import ActiveStress
@@ -211,7 +211,7 @@ def _check_fmu(path: Path) -> None:
     with _sound_or_refused(path):
         file = FmuFile(path)
         description = read_description(file)
-        fields(description, ("input", "output"), {})
+        fields(description, groups(description.modelVariables, ("input", "output")), {})
         file.unpack(folder)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from ...variable import parameter
+from .guccione import Guccione
 from .holzapfel_fiber import HolzapfelFiber
 from .law import Law
 from .neo_hooke import NeoHooke
@@ -11,6 +12,7 @@ from .neo_hooke import NeoHooke
 MATERIALS: dict[str, tuple[type[Law], ...]] = {
     "neo_hooke_with_fibers": (NeoHooke, HolzapfelFiber),
     "neo_hooke": (NeoHooke,),
+    "guccione": (Guccione,),
 }
 
 #: Every law once: the groups of parameters of a unit that has a material.

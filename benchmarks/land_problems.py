@@ -1,0 +1,149 @@
+"""The two passive problems of Land et al. 2015 (Proc. R. Soc. A 471:20150641) on structured meshes.
+
+Problem 1: a beam of 10 x 1 x 1 mm with fibres along it, fixed at x = 0, under 4 Pa from below, which follow its face.
+Problem 2: half an ellipsoid, isotropic, fixed at its base, under 10 kPa inside. By symmetry a quarter of it is enough.
+"""
+
+import numpy as np
+from cardiac_cosim.units.arrays import FloatArray
+from cardiac_cosim.units.mechanics.bulk import Tissue
+from cardiac_cosim.units.mechanics.elements.registry import ELEMENTS
+from cardiac_cosim.units.mechanics.elements.space import Space
+from cardiac_cosim.units.mechanics.laws.guccione import Guccione
+from cardiac_cosim.units.mechanics.loads.cavity_pressure import CavityPressure
+from cardiac_cosim.units.mechanics.solid import Solid
+from cardiac_cosim.units.mechanics.solvers.choice import LinearSolver
+from cardiac_cosim.units.mechanics.solvers.equilibrium import Convergence, Equilibrium
+from cardiac_cosim.units.mechanics.solvers.factored import Factored, Factors, NotConverged
+from cardiac_cosim.units.mechanics.solvers.newton import Newton
+from cardiac_cosim.units.mesh import Mesh
+from skfem import MeshTet
+
+#: Penalty on changes of volume in MPa; with twice of it the tip moves by 2 μm and the apex by 8.
+BULK_MPA = 0.5
+
+_BEAM_LOAD_MPA, _ELLIPSOID_LOAD_MPA = 4e-6, 10e-3
+_TIP = (10.0, 0.5, 1.0)
+#: Semi-axes (short, long) inside and outside, and the height of the base, in mm.
+_INNER, _OUTER, _BASE_MM = (7.0, 17.0), (10.0, 20.0), 5.0
+_APEX = (0.0, 0.0, -0.5 * (_INNER[1] + _OUTER[1]))
+_ISOTROPIC = {"guccione_fiber": 1.0, "guccione_transverse": 1.0, "guccione_shear": 1.0}
+_TOLERANCE = 1e-6
+
+
+def beam(across: int) -> Mesh:
+    """Problem 1 with a number of cells across and twenty times as many along, denser where it is fixed; `loaded`."""
+    side = np.linspace(0.0, 1.0, across + 1)
+    points, cells = _grid(10.0 * np.linspace(0.0, 1.0, 20 * across + 1) ** 1.5, side, side)
+    surface = Mesh(points, cells).surface
+    return Mesh(points, cells, {"loaded": surface[(points[surface, 2] == 0.0).all(axis=1)]})
+
+
+def tip_mm(mesh: Mesh, order: int, bulk_MPa: float = BULK_MPA) -> float:
+    """Problem 1: the height in mm of the tip, (10, 0.5, 1), which an even number of cells across has as a node of P1.
+
+    The rim of the face moves, so that the load has no potential; the line search asks for the work of the residual.
+    """
+    law = Guccione(guccione_bulk_modulus_MPa=bulk_MPa)
+    space = ELEMENTS[order](mesh)
+    fixed = np.repeat(space.points[:, :1] == 0.0, 3, axis=1)
+    solid, rest, loads = _loaded(space, mesh, law, fixed, "loaded", _BEAM_LOAD_MPA)
+    limit = _TOLERANCE * law.modulus * float(mesh.volumes.mean()) ** (2.0 / 3.0)
+    newton = _ByWork(solid, Factors(solid, LinearSolver().factorisation(solid)), limit, iterations=200)
+    return _height(space, newton.solve(rest, loads, Factored(rest, np.zeros_like(loads))).displacement, _TIP)
+
+
+def ellipsoid(through: int) -> Mesh:
+    """A quarter of problem 2, x > 0 and y > 0, with a number of cells through the wall; `endocardium`.
+
+    There are eight times as many cells from apex to base, and four times as many around.
+    """
+    axes = (np.linspace(0.0, 1.0, count + 1) for count in (through, 8 * through, 4 * through))
+    grid, cells = _grid(*axes)
+    surface = Mesh(grid, cells).surface
+    inner = surface[(grid[surface, 0] == 0.0).all(axis=1)]
+    wall, up, around = grid.T
+    short, long = (inside + wall * (outside - inside) for inside, outside in zip(_INNER, _OUTER, strict=True))
+    angle = np.pi + (np.arccos(_BASE_MM / long) - np.pi) * up
+    radius = short * np.sin(angle)
+    moved = np.stack(
+        [radius * np.cos(0.5 * np.pi * around), radius * np.sin(0.5 * np.pi * around), long * np.cos(angle)], axis=1
+    )
+    # On the planes of symmetry and in that of the base to the bit; rings of nodes at the apex become one node each.
+    moved[np.abs(moved) < 1e-9] = 0.0
+    moved[up == 1.0, 2] = _BASE_MM
+    _, first, numbers = np.unique(np.round(moved, 9), axis=0, return_index=True, return_inverse=True)
+    points, numbers = moved[first], numbers.ravel()
+    cells, inner = (_with_distinct_nodes(numbers[simplices]) for simplices in (cells, inner))
+    return Mesh(points, _upright(points, cells), {"endocardium": inner})
+
+
+def apex_mm(mesh: Mesh, order: int, bulk_MPa: float = BULK_MPA) -> float:
+    """Problem 2: the height in mm of the apex in the middle of the wall, a node of P1 where the cells are even."""
+    law = Guccione(0.01, guccione_bulk_modulus_MPa=bulk_MPa, **_ISOTROPIC)
+    space = ELEMENTS[order](mesh)
+    fixed = space.points == 0.0
+    fixed[:, 2] = False
+    fixed[space.points[:, 2] == _BASE_MM] = True
+    solid, rest, loads = _loaded(space, mesh, law, fixed, "endocardium", _ELLIPSOID_LOAD_MPA)
+    equilibrium = Equilibrium(
+        solid,
+        law.modulus * float(mesh.volumes.mean()) ** (2.0 / 3.0),
+        Convergence(equilibrium_tolerance=_TOLERANCE, newton_iterations=60),
+        LinearSolver().factorisation(solid),
+    )
+    unloaded = np.zeros_like(loads)
+    found = equilibrium.solve(rest, rest, unloaded, loads, Factored(rest, unloaded))
+    return _height(space, found.displacement, _APEX)
+
+
+class _ByWork(Newton):
+    """Newton's method for loads without a potential: a step counts if the residual does less work along it."""
+
+    def search(
+        self, displacement: FloatArray, loads: FloatArray, step: FloatArray, energy: float, residual: FloatArray
+    ) -> tuple[FloatArray, float, FloatArray]:
+        """The largest of the fractions 1, ½, ¼, … of the step that counts."""
+        for halvings in range(12):
+            trial = self._solid.moved(displacement, 0.5**halvings * step)
+            with np.errstate(over="ignore", invalid="ignore"):
+                energy, found = self._solid.energy_and_residual(trial, loads)
+                if abs(step @ found) < 0.8 * abs(step @ residual):
+                    return trial, energy, found
+        raise NotConverged("no part of the Newton step lowers the work of the residual")
+
+
+def _loaded(
+    space: Space, mesh: Mesh, law: Guccione, fixed: np.ndarray, boundary: str, load_MPa: float
+) -> tuple[Solid, FloatArray, FloatArray]:
+    """The solid with a pressure on `boundary`, no displacement, and the loads with that pressure."""
+    along = np.tile([1.0, 0.0, 0.0], (mesh.elements, 1))
+    across = np.tile([0.0, 0.0, 1.0], (mesh.elements, 1))
+    tissue = Tissue(along, across, [law], np.zeros((mesh.elements, 3, 3)))
+    solid = Solid(space, tissue, ~fixed, [CavityPressure(space, mesh.boundary(boundary))])
+    loads = np.zeros(solid.loads)
+    loads[-1] = load_MPa
+    return solid, np.zeros_like(space.points), loads
+
+
+def _height(space: Space, displacement: FloatArray, at: tuple[float, float, float]) -> float:
+    node = int(np.linalg.norm(space.points - at, axis=1).argmin())
+    if not np.allclose(space.points[node], at, rtol=0.0, atol=1e-9):
+        raise ValueError(f"no node at {at}: the number of cells has to be even with P1")
+    return float(space.points[node, 2] + displacement[node, 2])
+
+
+def _grid(*axes: FloatArray) -> tuple[FloatArray, np.ndarray]:
+    grid = MeshTet.init_tensor(*axes)
+    points = grid.p.T.copy()
+    return points, _upright(points, grid.t.T.copy())
+
+
+def _upright(points: FloatArray, cells: np.ndarray) -> np.ndarray:
+    inverted = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0.0
+    cells[inverted] = cells[inverted][:, [0, 2, 1, 3]]
+    return cells
+
+
+def _with_distinct_nodes(simplices: np.ndarray) -> np.ndarray:
+    return simplices[(np.diff(np.sort(simplices, axis=1), axis=1) != 0).all(axis=1)]

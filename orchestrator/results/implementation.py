@@ -1,0 +1,52 @@
+"""What the units computed with: in the summary, told once where it is slower than it need be, and kept for a resume.
+
+Kernels, instruction sets and linear solvers round differently. A run that goes on with others than those it began with
+would be neither of the two runs; like one with other packages it is refused.
+"""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, ParticipantError, RunError
+from ..participants.participant import Implementation, Participant
+
+
+def implementations(participants: Mapping[str, Participant]) -> dict[str, Implementation]:
+    """What each participant says of itself, once it is initialised."""
+    found = {}
+    for name, participant in participants.items():
+        try:
+            found[name] = participant.implementation()
+        except ParticipantError as error:
+            raise RunError(f"unit '{name}' does not say what it computes with: {error}") from error
+    return found
+
+
+def texts(found: Mapping[str, Implementation]) -> dict[str, str]:
+    """What each unit computes with, of those that say it."""
+    return {name: implementation.text for name, implementation in found.items() if implementation.text}
+
+
+def fallbacks(found: Iterable[Implementation]) -> list[str]:
+    """What is slower than it need be, each sentence once, however many units say it."""
+    return list(dict.fromkeys(sentence for implementation in found for sentence in implementation.fallbacks))
+
+
+def memory(found: Mapping[str, Implementation]) -> dict[str, NDArray[np.str_]]:
+    """For a checkpoint."""
+    return {name: np.array(text) for name, text in texts(found).items()}
+
+
+def check(before: Mapping[str, NDArray[np.str_]], found: Mapping[str, Implementation]) -> None:
+    """InputError where a unit computes with something else than what the `memory` of an earlier process has."""
+    now = texts(found)
+    for name in sorted({*before, *now}):
+        earlier = str(before[name]) if name in before else "something that it did not say"
+        if earlier != now.get(name, ""):
+            raise InputError(
+                f"unit '{name}' computed with {earlier} and computes with {now.get(name) or 'something else'} here; "
+                "results differ between them in their last digits. Go on where it computes with the same, or run "
+                "without --resume to begin anew"
+            )
