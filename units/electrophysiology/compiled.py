@@ -16,8 +16,8 @@ from .ionic.model import IonicModel
 from .monodomain import Monodomain
 from .progress import LARGEST_PHI, NOT_ACTIVATED, SOLVER_ITERATIONS, SOLVER_TOLERANCE, Limits, Progress, unsolved
 
-#: As in units/kernels: rows of a chunk, and what the function returns.
-_ROWS = 8
+#: As in units/kernels: rows of a chunk, most variables of a cell, and what the function returns.
+_ROWS, _MOST_VARIABLES = 8, 8
 _UNSOLVED, _TOO_LOW, _TOO_LARGE = 1, 2, 3
 
 
@@ -40,7 +40,7 @@ class _Monodomain(ctypes.Structure):
         ("nodes", c_int64),
         ("elements", c_int64),
         ("corners", c_int64),
-        ("points", c_int64),
+        ("integrated", c_int64),
         ("variables", c_int64),
         ("lumped", c_int64),
         ("mass", c_void_p),
@@ -72,7 +72,7 @@ class _Chunks:
 
     def __init__(self, pattern: Pattern) -> None:
         graph = pattern.csr(np.ones(pattern.entries, dtype=np.int8))
-        self.order = reverse_cuthill_mckee(graph, symmetric_mode=True)
+        self.order = reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
         self.rank = np.empty_like(self.order)
         self.rank[self.order] = np.arange(pattern.size, dtype=self.rank.dtype)
         lengths = np.diff(pattern.row_starts)
@@ -102,7 +102,7 @@ class _Chunks:
     def vector(self, values: FloatArray) -> FloatArray:
         """`values`, shape (..., nodes), in our order and filled up with zeros."""
         filled = np.zeros((*values.shape[:-1], self.size))
-        filled[..., : len(self.order)] = values[..., self.order]
+        filled[..., : len(self.order)] = np.take(values, self.order, axis=-1)
         return filled
 
 
@@ -114,7 +114,6 @@ class CompiledIntegration:
         self._function = advance
         self._chunks = chunks = _Chunks(equation.pattern)
         mesh, corners = equation.mesh, equation.mesh.dimension + 1
-        points = 0 if equation.nodal else len(quadrature(mesh.dimension)[1])
         # Held here: the structure has their addresses only.
         self._arrays: dict[str, Any] = {
             "mass": chunks.matrix(equation.mass_values, 1.0),
@@ -123,8 +122,8 @@ class CompiledIntegration:
             "conductance": equation.opening * mesh.volumes / (corners * (corners + 1)),
             "slots": chunks.place[equation.pattern.slots],
             "cells": chunks.rank[mesh.cells].astype(np.int32),
-            "shapes": quadrature(mesh.dimension)[0] if points else np.empty(0),
-            "point_weights": self._weights(equation) if points else np.empty(0),
+            "shapes": np.empty(0) if equation.nodal else quadrature(mesh.dimension)[0],
+            "point_weights": np.empty(0) if equation.nodal else self._weights(equation),
             "constants": np.array(ionic.constants, dtype=np.float64),
         }
         self._equation = _Monodomain(
@@ -132,7 +131,7 @@ class CompiledIntegration:
             mesh.nodes,
             mesh.elements,
             corners,
-            points,
+            not equation.nodal,
             1 + len(ionic.states),
             equation.lumped,
             *map(kernels.address, self._arrays.values()),
@@ -167,8 +166,10 @@ class CompiledIntegration:
             raise self._limits.too_low(int(self._chunks.order[int(report[0])]))
         if wrong == _TOO_LARGE:
             raise self._limits.too_large(int(self._chunks.order[int(report[0])]), float(report[1]))
-        rank = self._chunks.rank
-        return Progress(values[:, rank], activation_time[rank], increments[:, rank], substep)
+        values, activation_time, increments = (
+            np.take(array, self._chunks.rank, axis=-1) for array in (values, activation_time, increments)
+        )
+        return Progress(values, activation_time, increments, substep)
 
     @staticmethod
     def _weights(equation: Monodomain) -> FloatArray:
@@ -178,7 +179,7 @@ class CompiledIntegration:
 
 def compiled(equation: Monodomain, ionic: IonicModel, limits: Limits) -> CompiledIntegration | None:
     """The compiled substeps; None where there are no kernels, or none for the ionic model."""
-    if kernels.variant() is None or ionic.kernel is None:
+    if kernels.variant() is None or ionic.kernel is None or 1 + len(ionic.states) > _MOST_VARIABLES:
         return None
     advance = kernels.kernel("monodomain_advance", integers=2, pointers=9)
     rates = kernels.kernel(ionic.kernel, integers=2, pointers=3)

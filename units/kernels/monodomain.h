@@ -10,7 +10,7 @@
 #ifndef MONODOMAIN_TYPES
 #define MONODOMAIN_TYPES
 
-/* Points of a block of elements that are integrated together; most points of an element, most variables of a cell. */
+/* Elements that are integrated together, most points of an element, most variables of a cell. */
 #define BLOCK_ELEMENTS 16
 #define MOST_POINTS 4
 #define MOST_VARIABLES 8
@@ -25,7 +25,7 @@ struct monodomain {
     int64_t nodes;
     int64_t elements;
     int64_t corners;
-    int64_t points;               /* quadrature points of an element; 0: currents at the nodes */
+    int64_t integrated;           /* whether currents are integrated; else they are taken at the nodes */
     int64_t variables;            /* the potential and the ionic model's states */
     int64_t lumped;               /* whether the conductance is lumped */
     const double *mass;           /* [entries] */
@@ -34,8 +34,8 @@ struct monodomain {
     const double *conductance;    /* [elements], of unit stretch beyond 1, over (d + 1)(d + 2) */
     const int32_t *slots;         /* [elements][corners][corners], where an element's matrix lands */
     const int32_t *cells;         /* [elements][corners] */
-    const double *shapes;         /* [points][corners] */
-    const double *point_weights;  /* [elements][points], weight times ionic time per ms */
+    const double *shapes;         /* [corners][corners], of each point of the rule at each corner */
+    const double *point_weights;  /* [elements][corners], weight times ionic time per ms */
     const double *constants;
     ionic_rates rates;
     double reversal;
@@ -104,33 +104,58 @@ static void VARIANT(nodal_rates)(const struct monodomain *equation, const double
             rates[v * size + i] *= equation->node_rate[i];
 }
 
-/* The load of the ionic current integrated by the rule, all variables being interpolated to its points. */
+/* The load of the ionic current on elements of `corners` corners, which is a constant wherever this is called. The elements of a block lie
+   side by side; the last of all stands in for those that a block lacks. */
+static inline __attribute__((always_inline)) void VARIANT(integrate)(const struct monodomain *equation, const double *values,
+                                                                     double *restrict load, const int corners)
+{
+    const int64_t size = equation->pattern.chunks * ROWS, points = corners, stride = BLOCK_ELEMENTS * corners;
+    double at[MOST_VARIABLES * BLOCK_ELEMENTS * MOST_POINTS], rates[MOST_VARIABLES * BLOCK_ELEMENTS * MOST_POINTS];
+    double corner[MOST_POINTS][BLOCK_ELEMENTS];
+    for (int64_t begin = 0; begin < equation->elements; begin += BLOCK_ELEMENTS) {
+        int64_t element[BLOCK_ELEMENTS];
+        for (int e = 0; e < BLOCK_ELEMENTS; e++)
+            element[e] = begin + e < equation->elements ? begin + e : equation->elements - 1;
+        for (int64_t v = 0; v < equation->variables; v++) {
+            for (int a = 0; a < corners; a++)
+                for (int e = 0; e < BLOCK_ELEMENTS; e++)
+                    corner[a][e] = values[v * size + equation->cells[element[e] * corners + a]];
+            for (int p = 0; p < points; p++)
+                for (int e = 0; e < BLOCK_ELEMENTS; e++) {
+                    double sum = 0.0;
+                    for (int a = 0; a < corners; a++)
+                        sum += equation->shapes[p * corners + a] * corner[a][e];
+                    at[v * stride + p * BLOCK_ELEMENTS + e] = sum;
+                }
+        }
+        equation->rates(stride, stride, equation->constants, at, rates);
+        for (int p = 0; p < points; p++)
+            for (int e = 0; e < BLOCK_ELEMENTS; e++)
+                rates[p * BLOCK_ELEMENTS + e] *= equation->point_weights[element[e] * points + p];
+        for (int a = 0; a < corners; a++) {
+            for (int e = 0; e < BLOCK_ELEMENTS; e++) {
+                double sum = 0.0;
+                for (int p = 0; p < points; p++)
+                    sum += equation->shapes[p * corners + a] * rates[p * BLOCK_ELEMENTS + e];
+                corner[a][e] = sum;
+            }
+            for (int e = 0; e < BLOCK_ELEMENTS && begin + e < equation->elements; e++)
+                load[equation->cells[element[e] * corners + a]] += corner[a][e];
+        }
+    }
+}
+
+/* The load of the ionic current integrated by the rule of as many points as an element has corners, all variables being
+   interpolated to its points. */
 static void VARIANT(integrated_load)(const struct monodomain *equation, const double *values, double *restrict load)
 {
-    const int64_t size = equation->pattern.chunks * ROWS, points = equation->points, corners = equation->corners;
-    double at[MOST_VARIABLES * BLOCK_ELEMENTS * MOST_POINTS], rates[MOST_VARIABLES * BLOCK_ELEMENTS * MOST_POINTS];
-    memset(load, 0, size * sizeof *load);
-    for (int64_t begin = 0; begin < equation->elements; begin += BLOCK_ELEMENTS) {
-        const int64_t left = equation->elements - begin, count = left < BLOCK_ELEMENTS ? left : BLOCK_ELEMENTS;
-        const int64_t stride = count * points;
-        for (int64_t v = 0; v < equation->variables; v++)
-            for (int64_t e = 0; e < count; e++)
-                for (int64_t p = 0; p < points; p++) {
-                    double sum = 0.0;
-                    for (int64_t a = 0; a < corners; a++)
-                        sum += equation->shapes[p * corners + a] * values[v * size + equation->cells[(begin + e) * corners + a]];
-                    at[v * stride + e * points + p] = sum;
-                }
-        equation->rates(stride, stride, equation->constants, at, rates);
-        for (int64_t e = 0; e < count; e++)
-            for (int64_t a = 0; a < corners; a++) {
-                double sum = 0.0;
-                for (int64_t p = 0; p < points; p++)
-                    sum += equation->shapes[p * corners + a] * equation->point_weights[(begin + e) * points + p] *
-                           rates[e * points + p];
-                load[equation->cells[(begin + e) * corners + a]] += sum;
-            }
-    }
+    memset(load, 0, equation->pattern.chunks * ROWS * sizeof *load);
+    if (equation->corners == 4)
+        VARIANT(integrate)(equation, values, load, 4);
+    else if (equation->corners == 3)
+        VARIANT(integrate)(equation, values, load, 3);
+    else
+        VARIANT(integrate)(equation, values, load, 2);
 }
 
 /* 0, or what is wrong with the potential; report[0] is the node, report[1] the potential there. */
@@ -185,9 +210,9 @@ EXPORT int VARIANT(monodomain_advance)(int64_t count, int64_t held, const struct
         /* The stage in the middle. */
         VARIANT(nodal_rates)(equation, values, early);
         for (int64_t i = 0; i < size; i++)
-            side[i] = equation->points ? phi[i] : phi[i] + implicit * early[i];
+            side[i] = equation->integrated ? phi[i] : phi[i] + implicit * early[i];
         VARIANT(multiply)(pattern, equation->mass, side, right);
-        if (equation->points) {
+        if (equation->integrated) {
             VARIANT(integrated_load)(equation, values, early);
             for (int64_t i = 0; i < size; i++)
                 right[i] += implicit * early[i];
@@ -213,14 +238,14 @@ EXPORT int VARIANT(monodomain_advance)(int64_t count, int64_t held, const struct
         /* The end. */
         VARIANT(nodal_rates)(equation, middle, late);
         const double share = (1.0 - gamma) / gamma;
-        if (equation->points)
+        if (equation->integrated)
             for (int64_t i = 0; i < size; i++)
                 side[i] = phi[i] + share * middle[i];
         else
             for (int64_t i = 0; i < size; i++)
                 side[i] = phi[i] + share * middle[i] + substep * (delta * early[i] + (1.0 - delta) * late[i]);
         VARIANT(multiply)(pattern, equation->mass, side, residual);
-        if (equation->points) {
+        if (equation->integrated) {
             VARIANT(integrated_load)(equation, middle, late);
             for (int64_t i = 0; i < size; i++)
                 residual[i] += substep * (delta * early[i] + (1.0 - delta) * late[i]);
