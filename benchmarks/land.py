@@ -9,7 +9,7 @@ from cardiac_cosim.units.mesh import Mesh
 from .land_problems import BULK_MPA, apex_mm, beam, ellipsoid, tip_mm
 from .page import write_between
 
-_PAGE = Path(__file__).parent.parent / "docs" / "mechanics.md"
+PAGE = Path(__file__).parent.parent / "docs" / "mechanics.md"
 _PENALTIES_MPA = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 #: Cells across, for each order of the displacement.
 _BEAMS, _ELLIPSOIDS = {2: (1, 2, 3, 4), 1: (2, 4, 8)}, {2: (1, 2, 3), 1: (2, 4, 6)}
@@ -64,4 +64,4 @@ def measure() -> str:
 
 
 if __name__ == "__main__":
-    write_between(_PAGE, "land", measure())
+    write_between(PAGE, "land", measure())

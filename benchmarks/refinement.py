@@ -20,7 +20,7 @@ _APEX_MM = np.array([0.0, 0.0, -60.0])
 _STOP_MS, _STEP_MS = 130, 2
 
 
-def _with_boundaries(mesh: Mesh, inner: Refined) -> Mesh:
+def with_boundaries(mesh: Mesh, inner: Refined) -> Mesh:
     """The refined mesh with the boundaries of the coarse one: a part of a face lies in its plane, at its parent."""
     surface = inner.mesh.surface
     centres = inner.mesh.points[surface].mean(axis=1)
@@ -40,7 +40,7 @@ def _with_boundaries(mesh: Mesh, inner: Refined) -> Mesh:
     return Mesh(inner.mesh.points, inner.mesh.cells, boundaries)
 
 
-def _started(unit: Unit, parameters: dict[str, float], inputs: dict[str, np.ndarray]) -> Unit:
+def started(unit: Unit, parameters: dict[str, float], inputs: dict[str, np.ndarray]) -> Unit:
     unit.instantiate(parameters)
     unit.setup_experiment()
     unit.enter_initialization_mode()
@@ -52,9 +52,9 @@ def _started(unit: Unit, parameters: dict[str, float], inputs: dict[str, np.ndar
 
 def _beat(mesh: Mesh, directions: dict[str, np.ndarray], parameters: dict[str, float], mechanics: bool) -> np.ndarray:
     """Activation times in ms of all nodes: Gauss–Seidel, or the wave alone."""
-    wave = _started(Electrophysiology(mesh), parameters, {"fiber": directions["fiber"]})
-    tension = _started(ActiveStress(mesh), {}, {})
-    wall = _started(Mechanics(mesh), {}, directions) if mechanics else None
+    wave = started(Electrophysiology(mesh), parameters, {"fiber": directions["fiber"]})
+    tension = started(ActiveStress(mesh), {}, {})
+    wall = started(Mechanics(mesh), {}, directions) if mechanics else None
     for number in range(_STOP_MS // _STEP_MS):
         time, step = 1e-3 * _STEP_MS * number, 1e-3 * _STEP_MS
         wave.do_step(time, step)
@@ -75,7 +75,7 @@ def _report(what: str, heart: Mesh, times: np.ndarray, since: float) -> None:
 
 if __name__ == "__main__":
     heart = build("biventricle", 5.0)
-    generator = _started(FiberGenerator(heart), {}, {})
+    generator = started(FiberGenerator(heart), {}, {})
     own = {name: generator.get(name) for name in ("fiber", "sheet")}
     quiet = {"stretch_conductance": 0.0}
     for level in range(3):
@@ -95,7 +95,7 @@ if __name__ == "__main__":
     begin = perf_counter()
     _report("with feedback, refine: 1", heart, _beat(heart, own, {"refine": 1}, mechanics=True), begin)
     begin = perf_counter()
-    whole = _with_boundaries(heart, fine)
+    whole = with_boundaries(heart, fine)
     inherited = {name: values[fine.parents] for name, values in own.items()}
     _report("with feedback, all refined once", heart, _beat(whole, inherited, {}, mechanics=True), begin)
     begin = perf_counter()

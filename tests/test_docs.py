@@ -33,6 +33,21 @@ def test_every_file_that_the_readme_links_to_is_there() -> None:
             assert (_ROOT / target).exists(), target
 
 
+def test_diffs_that_the_pages_show_are_those_of_the_files() -> None:
+    # Whoever adds a law or a geometry goes by them.
+    shown = 0
+    for page in ("CONTRIBUTING.md", "docs/scenes.md"):
+        for block in (_ROOT / page).read_text(encoding="utf-8").split("```diff\n")[1:]:
+            file: list[str] = []
+            for line in block.split("```")[0].splitlines():
+                if line.startswith("+++ b/"):
+                    file = (_ROOT / line.removeprefix("+++ b/")).read_text(encoding="utf-8").splitlines()
+                elif line.startswith("+"):
+                    assert line[1:] in file, line
+                    shown += 1
+    assert shown >= 8
+
+
 def test_every_run_that_the_readme_shows_has_a_valid_scenario() -> None:
     text = (_ROOT / "README.md").read_text(encoding="utf-8").replace("\\\n", " ")
     runs = [shlex.split(line, comments=True) for line in text.splitlines() if line.startswith("cosim run ")]
