@@ -18,5 +18,5 @@ def frozen(values: ArrayLike) -> FloatArray:
 
 
 def inner(left: FloatArray, right: FloatArray) -> float:
-    """The inner product of vectors, shape (n,). Unlike that of BLAS, its bits do not depend on the number of threads."""
+    """The inner product of vectors, shape (n,); its bits depend on no number of threads, as those of BLAS do."""
     return float(np.einsum("i,i->", left, right))

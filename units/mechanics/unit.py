@@ -29,12 +29,11 @@ from ..unit import Unit
 from ..variable import Causality, Location, Record, Variable
 from .bulk import Tissue
 from .elements.registry import Elements
-from .elements.space import Space
 from .laws.neo_hooke import NeoHooke
 from .laws.registry import LAWS, Material
 from .loads.active_stress import ActiveShares
 from .loads.cavity_pressure import CavityPressure
-from .loads.springs import Pericardium, Springs
+from .loads.registry import SUPPORTS
 from .solid import Solid
 from .solvers.choice import LinearSolver
 from .solvers.equilibrium import Convergence, Equilibrium
@@ -58,7 +57,7 @@ class Mechanics(Unit):
 
     name = "mechanics"
     memoryless = True
-    groups = (Material, *LAWS, ActiveShares, Pericardium, Elements, Convergence, LinearSolver)
+    groups = (Material, *LAWS, ActiveShares, *SUPPORTS, Elements, Convergence, LinearSolver)
     fields = (
         Variable("active_stress", Causality.INPUT, "kPa", "active stress along the fibre", Location.NODE),
         *(
@@ -128,7 +127,7 @@ class Mechanics(Unit):
             Tissue(fiber, sheet, laws, self.parameters(ActiveShares).tensor(fiber, sheet)),
             _free(len(space.points), space.face_nodes(mesh.boundary("base"))),
             list(self._cavities.values()),
-            self._supports(space),
+            [load for load in (self.parameters(kind).on(mesh, space) for kind in SUPPORTS) if load is not None],
         )
         self._factorisation = self.parameters(LinearSolver).factorisation(self._solid)
         element_size = float(mesh.volumes.mean()) ** (1.0 / 3.0)
@@ -217,10 +216,6 @@ class Mechanics(Unit):
         weighted = loads.copy()
         weighted[self.mesh.nodes :] *= np.sqrt(self.mesh.nodes)
         return weighted
-
-    def _supports(self, space: Space) -> list[tuple[float, Springs]]:
-        stiffness = _MPA_PER_KPA * self.parameters(Pericardium).epicardium_stiffness_kPa_per_mm
-        return [(stiffness, Springs(space, self.mesh.boundary("epicardium")))] if stiffness else []
 
 
 #: The last changes of loads and of displacement in the state, the latest first.

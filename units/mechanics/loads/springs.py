@@ -8,8 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import FloatArray, IntArray
+from ...mesh import Mesh
 from ...variable import parameter
 from ..elements.space import Space
+from .surface_load import SurfaceLoad
+
+_MPA_PER_KPA = 1e-3
 
 
 @dataclass(frozen=True)
@@ -19,6 +23,12 @@ class Pericardium:
     epicardium_stiffness_kPa_per_mm: float = parameter(
         0.0, "kPa/mm", "stiffness of springs along the normal of the epicardium; 0: none", at_least=0.0
     )
+
+    def on(self, mesh: Mesh, space: Space) -> tuple[float, SurfaceLoad] | None:
+        """See Support."""
+        if not self.epicardium_stiffness_kPa_per_mm:
+            return None
+        return _MPA_PER_KPA * self.epicardium_stiffness_kPa_per_mm, Springs(space, mesh.boundary("epicardium"))
 
 
 class Springs:
