@@ -46,9 +46,12 @@ class Drawing:
         if step.number == 0:
             self._tell("begun")
 
-    def finish(self) -> tuple[str, ...]:
-        """Draw the figures of the run that is done; warnings of what cannot be drawn."""
+    def begin(self) -> None:
+        """Draw the figures of the run that is done; to be waited for by `finish`."""
         self._tell("done")
+
+    def finish(self) -> tuple[str, ...]:
+        """Wait for the figures; warnings of what could not be drawn."""
         process = self._process
         line = "" if process is None or process.stdout is None else process.stdout.readline()
         if not line:

@@ -1,13 +1,14 @@
 """A whole run: scenario in, results folder out."""
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from threadpoolctl import threadpool_limits
 
 from .assembly import assemble, called_directly, checked_mesh
 from .coupling.master import Observer
@@ -60,11 +61,15 @@ def run_scenario(
     started = time.perf_counter()
     console = console or Console(quiet=True)
     with ResultsFolder(output, Origin.of(scenario, base)) as folder, ExitStack() as stack:
+        # The units' vectors are short: BLAS's threads cost more than they bring, many times as much where several
+        # processes share the cores, and the bits of a sum depend on their number.
+        stack.enter_context(threadpool_limits(limits=1))
         drawing = stack.enter_context(Drawing(output)) if figures else None
         summary = folder.complete() if resume else None
         if summary is None:
-            observers = [] if drawing is None else [drawing]
-            summary = _run(folder, scenario, base, console, fmu_dir, resume, started, observers)
+            summary = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing)
+        elif drawing is not None:
+            drawing.begin()
         if drawing is None:
             return Outcome(output, summary)
         with console.status("drawing the figures"):
@@ -79,7 +84,7 @@ def _run(
     fmu_dir: Path | None,
     resume: bool,
     started: float,
-    observers: Sequence[Observer],
+    drawing: Drawing | None,
 ) -> dict[str, Any]:
     before = folder.checkpoint() if resume else None
     mesh = checked_mesh(scenario, base)
@@ -114,10 +119,14 @@ def _run(
         with recording, bar:
             if unready is not None:
                 raise unready
-            master.run([recording, *observers, bar], stop)
+            observers: list[Observer] = [recording, bar]
+            master.run([*observers, drawing] if drawing is not None else observers, stop)
             if stop.signal is not None and not master.done:
                 recording.keep()
                 raise Interrupted(stop.signal)
+        # All results are there; the participants are closed while the figures are drawn.
+        if drawing is not None:
+            drawing.begin()
     return recording.summary
 
 

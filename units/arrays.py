@@ -15,3 +15,8 @@ def frozen(values: ArrayLike) -> FloatArray:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def inner(left: FloatArray, right: FloatArray) -> float:
+    """The inner product of vectors, shape (n,). Unlike that of BLAS, its bits do not depend on the number of threads."""
+    return float(np.einsum("i,i->", left, right))

@@ -17,7 +17,6 @@ from itertools import count
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from .arrays import FloatArray, frozen
 from .directions import FIBER_INPUT, check_directions
@@ -44,6 +43,9 @@ _MOST_EVALUATIONS = 20_000
 
 def _followed(rates: Callable[..., FloatArray], span: tuple[float, float], start: tuple[float, ...], **how: Any) -> Any:
     """The solution of an ordinary differential equation, shape (components, times); InvalidInput without one."""
+    # Imported here: it takes long, and whoever has another unit does without.
+    from scipy.integrate import solve_ivp
+
     evaluations = count()
 
     def counted(time: float, state: FloatArray) -> FloatArray:

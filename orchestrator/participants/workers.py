@@ -15,6 +15,7 @@ from typing import Any
 
 from distributed import Client, LocalCluster
 from distributed.actor import ActorFuture
+from threadpoolctl import threadpool_limits
 
 from ..errors import InputError, ParticipantError, ParticipantLost
 from .participant import Abilities, Implementation, Participant, Ports, Ramp, Values, Wait
@@ -92,6 +93,8 @@ class _Host:
 
     def __init__(self, recipe: Recipe) -> None:
         self._participant = recipe.make()
+        # As where the master works, whoever started this process.
+        threadpool_limits(limits=1)
         self._states: dict[int, Any] = {}
         self._saved = 0
 

@@ -95,7 +95,6 @@ class Origin:
         return found
 
 
-@cache
 def _versions() -> dict[str, str]:
     found = {}
     for name in _PACKAGES:

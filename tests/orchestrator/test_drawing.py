@@ -117,18 +117,22 @@ def test_a_process_that_cannot_draw_is_told_of_and_spoils_nothing(tmp_path: Path
         for process in _processes(tmp_path):
             os.kill(process, signal.SIGKILL)
         assert _is_gone(tmp_path)
+        drawing.begin()
         (warning,) = drawing.finish()
     assert "the process that draws them has ended; all other results are complete" in warning
 
 
 def test_a_bug_in_drawing_looks_like_one(tmp_path: Path) -> None:
     (tmp_path / "timeseries.csv").write_text("time_ms,lv_volume_ml\n0.0,no number\n")
-    with Drawing(tmp_path) as drawing, pytest.raises(RuntimeError, match=r"ValueError: .*no number"):
-        drawing.finish()
+    with Drawing(tmp_path) as drawing:
+        drawing.begin()
+        with pytest.raises(RuntimeError, match=r"ValueError: .*no number"):
+            drawing.finish()
 
 
 def test_a_file_of_a_librarys_name_where_we_are_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "matplotlib.py").write_text("raise SystemExit('run')")
     with Drawing(tmp_path) as drawing:
+        drawing.begin()
         assert drawing.finish() == ()

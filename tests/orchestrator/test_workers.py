@@ -16,9 +16,12 @@ import pytest
 from cardiac_cosim.orchestrator.errors import InputError, ParticipantLost, RunError
 from cardiac_cosim.orchestrator.participants.participant import Participant
 from cardiac_cosim.orchestrator.participants.recipe import Recipe
-from cardiac_cosim.orchestrator.participants.workers import Workers
+from cardiac_cosim.orchestrator.participants.workers import Workers, _Host
+from cardiac_cosim.orchestrator.results.recording import Recording
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.units.mesh import Mesh
+from threadpoolctl import threadpool_info, threadpool_limits
 
 
 def _series(scenario: Path, out: Path, *sets: str) -> bytes:
@@ -32,6 +35,30 @@ def test_workers_give_the_same_bits(where: str, participants: str, small_scenari
     common = ("coupling.scheme=jacobi", f"run.participants={participants}", "run.stop_ms=5")
     alone = _series(small_scenario, tmp_path / "alone", *common)
     assert _series(small_scenario, tmp_path / "workers", *common, f"run.workers={where}") == alone
+
+
+def test_no_unit_starts_threads_of_its_own(
+    small_scenario: Path, small_heart: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+
+    class Watches(Recording):
+        def accept(self, step: Any, exchange: Any) -> None:
+            seen.append(_threads())
+            super().accept(step, exchange)
+
+    monkeypatch.setattr("cardiac_cosim.orchestrator.results.folder.Recording", Watches)
+    with threadpool_limits(limits=2):
+        _series(small_scenario, tmp_path / "out", "run.stop_ms=2")
+        assert seen == [{1}] * 3
+        # What a run finds it leaves.
+        assert _threads() == {2}
+        _Host(Recipe("a", unit="active_stress", mesh=small_heart))
+        assert _threads() == {1}
+
+
+def _threads() -> set[int]:
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
 
 def test_iterated_and_ramped_coupling_works_in_workers(small_scenario: Path, tmp_path: Path) -> None:

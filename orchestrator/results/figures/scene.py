@@ -162,6 +162,8 @@ def show(axis: Axes, view: View, layers: Sequence[Sequence[Painted]], middle: Va
     reach = _MARGIN * half_mm
     center = middle @ right, middle @ upward
     axis.set(xlim=(center[0] - reach, center[0] + reach), ylim=(center[1] - reach, center[1] + reach), aspect="equal")
+    # Ticks are not shown, but would be laid out all the same.
+    axis.set(xticks=[], yticks=[])
     axis.set_axis_off()
 
 

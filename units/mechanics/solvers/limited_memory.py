@@ -6,7 +6,7 @@ Source: Nocedal & Wright 2006, algorithm 7.4.
 import numpy as np
 
 from ... import kernels
-from ...arrays import FloatArray
+from ...arrays import FloatArray, inner
 from .factorisation import Solve
 
 #: Pairs that are remembered; more gain nothing.
@@ -32,7 +32,7 @@ class LimitedMemory:
 
     def remember(self, step: FloatArray, change: FloatArray) -> None:
         """That a `step` has changed the residual by `change`; without curvature along it, it tells nothing."""
-        curvature = float(step @ change)
+        curvature = inner(step, change)
         if not curvature > 0.0:
             return
         self._steps[self._next], self._changes[self._next] = step, change
@@ -52,10 +52,10 @@ class LimitedMemory:
             return direction
         rows = [(self._next - back) % _MEMORY for back in range(1, self._count + 1)]
         for row in rows:
-            self._alpha[row] = self._steps[row] @ direction / self._curvature[row]
+            self._alpha[row] = inner(self._steps[row], direction) / self._curvature[row]
             direction -= self._alpha[row] * self._changes[row]
         direction = solve(direction)
         for row in reversed(rows):
-            beta = self._changes[row] @ direction / self._curvature[row]
+            beta = inner(self._changes[row], direction) / self._curvature[row]
             direction = direction + (self._alpha[row] - beta) * self._steps[row]
         return direction

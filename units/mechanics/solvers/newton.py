@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...arrays import FloatArray, frozen
+from ...arrays import FloatArray, frozen, inner
 from ..solid import Solid
 from .factored import Factored, Factors, NotConverged, Solution, largest
 
@@ -30,7 +30,7 @@ class Newton:
                 break
             factored = Factored.here(displacement, loads)
             step = self._factors.at(factored)(-residual)
-            if not np.isfinite(step).all() or step @ residual >= 0.0:
+            if not np.isfinite(step).all() or inner(step, residual) >= 0.0:
                 raise NotConverged("the tangent stiffness is not positive definite: the solid is unstable there")
             displacement, energy, residual = self.search(displacement, loads, step, energy, residual)
         raise NotConverged(
@@ -42,14 +42,14 @@ class Newton:
         self, displacement: FloatArray, loads: FloatArray, step: FloatArray, energy: float, residual: FloatArray
     ) -> tuple[FloatArray, float, FloatArray]:
         """A fraction of the Newton step that inverts no element and lowers the energy or the residual."""
-        slope = float(step @ residual)
+        slope = inner(step, residual)
         fraction = 1.0
         for _ in range(_HALVINGS):
             trial = self._solid.moved(displacement, fraction * step)
             # A trial that goes much too far overflows; its energy is infinite or NaN, and it is not taken.
             with np.errstate(over="ignore", invalid="ignore"):
                 trial_energy, trial_residual = self._solid.energy_and_residual(trial, loads)
-                smaller = np.linalg.norm(trial_residual) < 0.5 * np.linalg.norm(residual)
+                smaller = inner(trial_residual, trial_residual) < 0.25 * inner(residual, residual)
             # Near the minimum the energy's decrease drowns in rounding; there the residual decides.
             if smaller or trial_energy <= energy + _SUFFICIENT * fraction * slope:
                 return trial, trial_energy, trial_residual

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import FloatArray
+from ...arrays import FloatArray, inner
 
 #: How many changes are remembered; longer spans gain nothing.
 MEMORY = 4
@@ -23,16 +23,16 @@ def predicted(
     guess = np.zeros_like(displacement_changes[0])
     basis: list[tuple[FloatArray, FloatArray]] = []
     for load, displacement in zip(load_changes, displacement_changes, strict=True):
-        before = np.sqrt(load @ load)
+        before = np.sqrt(inner(load, load))
         if not before > 0.0:
             continue
         # Loads are made orthogonal, and displacements, which follow linearly in the small, are taken along.
         for known, moved in basis:
-            part = known @ load
+            part = inner(known, load)
             load, displacement = load - part * known, displacement - part * moved
-        left = np.sqrt(load @ load)
+        left = np.sqrt(inner(load, load))
         if left < _NEW * before:
             continue
         basis.append((load / left, displacement / left))
-        guess += (basis[-1][0] @ change) * basis[-1][1]
+        guess += inner(basis[-1][0], change) * basis[-1][1]
     return guess
