@@ -6,9 +6,9 @@ or the ionic model has no compiled twin.
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.linalg import LinearOperator, cg
 
 from ..arrays import FloatArray
+from ..conjugate_gradients import conjugate_gradients
 from .ionic.model import IonicModel, Rates
 from .monodomain import Monodomain
 from .progress import LARGEST_PHI, NOT_ACTIVATED, SOLVER_ITERATIONS, SOLVER_TOLERANCE, Limits, Progress, unsolved
@@ -30,8 +30,6 @@ class MonodomainStep:
         self._step = step
         self._rates = rates
         self._matrix = csr_matrix(equation.mass + _GAMMA * step * operator)
-        inverse_diagonal = 1.0 / self._matrix.diagonal()
-        self._preconditioner = LinearOperator(self._matrix.shape, matvec=lambda residual: inverse_diagonal * residual)
 
     def __call__(self, values: FloatArray, foretold: FloatArray) -> tuple[FloatArray, FloatArray]:
         """A substep from φ and the states `values`, shape (1 + states, nodes).
@@ -62,18 +60,10 @@ class MonodomainStep:
         return equation.load @ (equation.point_rate * at_points), equation.node_rate * at_nodes[1:]
 
     def _solve(self, right: FloatArray, guess: FloatArray) -> FloatArray:
-        solution, failed = cg(
-            self._matrix,
-            right,
-            x0=guess,
-            rtol=SOLVER_TOLERANCE,
-            atol=0.0,
-            maxiter=SOLVER_ITERATIONS,
-            M=self._preconditioner,
-        )
-        if failed:
+        solution = conjugate_gradients(self._matrix, right, guess, SOLVER_TOLERANCE, SOLVER_ITERATIONS)
+        if solution is None:
             raise unsolved()
-        return np.asarray(solution)
+        return solution
 
 
 def stepper(equation: Monodomain, stretch: FloatArray, step: float, rates: Rates) -> MonodomainStep:

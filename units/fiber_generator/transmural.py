@@ -4,10 +4,11 @@ from itertools import chain
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.linalg import LinearOperator, cg, spsolve
+from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, IntArray
+from ..conjugate_gradients import conjugate_gradients
 from ..errors import InvalidInput
 from ..mesh import Mesh
 from ..mesh.finite_elements import diffusion_matrices, shape_gradients
@@ -49,10 +50,8 @@ def transmural_direction(mesh: Mesh, endocardium: tuple[str, ...], epicardium: t
 
 def _solved(system: csr_matrix, right: FloatArray) -> FloatArray:
     """Both sides of the wall hold w: iterations grow with the elements across it only, a factor's memory with all."""
-    diagonal = system.diagonal()
-    preconditioner = LinearOperator(system.shape, matvec=lambda residual: residual / diagonal)
-    solution, failed = cg(system, right, rtol=_TOLERANCE, atol=0.0, maxiter=_ITERATIONS, M=preconditioner)
-    return np.asarray(spsolve(system.tocsc(), right) if failed else solution)
+    solution = conjugate_gradients(system, right, np.zeros_like(right), _TOLERANCE, _ITERATIONS)
+    return np.asarray(spsolve(system.tocsc(), right)) if solution is None else solution
 
 
 def _filled_from_neighbours(mesh: Mesh, gradient: FloatArray) -> FloatArray:
