@@ -35,6 +35,8 @@ class UnitInstance:
         self._runs = layout(type(self.unit), mesh)
         self._firsts = np.array([run.first for run in self._runs])
         self._whole = {(run.first, run.size): run for run in self._runs}
+        # Compared with at every call: in the type in which they come, and made once.
+        self._references = {key: np.arange(key[0], sum(key), dtype=np.uint32) for key in self._whole}
         self._staged: dict[str, np.ndarray] = {}
         self._read: dict[str, np.ndarray] = {}
 
@@ -168,10 +170,10 @@ class UnitInstance:
 
     def _whole_run(self, references: np.ndarray) -> Run | None:
         """The run whose value references these are, all of them in their order."""
-        run = self._whole.get((int(references[0]), len(references))) if len(references) else None
-        if run is None or not np.array_equal(references, np.arange(run.first, run.first + run.size)):
+        key = (int(references[0]), len(references)) if len(references) else None
+        if key not in self._whole or not np.array_equal(references, self._references[key]):
             return None
-        return run
+        return self._whole[key]
 
     def _run(self, reference: int, fmi_type: str) -> Run:
         """The run that holds `reference`, which has to be of the type that the caller took it for."""

@@ -178,4 +178,4 @@ class Slave:
 
 
 def _references(view: memoryview) -> np.ndarray:
-    return np.frombuffer(view, np.uint32).astype(np.int64)
+    return np.frombuffer(view, np.uint32)

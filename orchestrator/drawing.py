@@ -28,7 +28,9 @@ class Drawing:
     def __enter__(self) -> "Drawing":
         # Without -P, a file of a library's name in the folder that we are in would be taken for that library.
         command = [sys.executable, "-P", "-m", f"{__package__}.results.figures", str(self._folder), str(os.getpid())]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        # That there is none is said when it is to answer, and keeps nothing from the run.
+        with suppress(OSError):
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         return self
 
     def __exit__(
@@ -55,7 +57,7 @@ class Drawing:
         process = self._process
         line = "" if process is None or process.stdout is None else process.stdout.readline()
         if not line:
-            return ("the figures are not drawn: the process that draws them has ended; all other results are complete",)
+            return ("the figures are not drawn: the process that draws them is gone; all other results are complete",)
         answer = json.loads(line)
         if "bug" in answer:
             raise RuntimeError(f"the figures cannot be drawn:\n{answer['bug']}")

@@ -51,7 +51,7 @@ class ArrayInstance:
         self._entries = {entry.reference: entry for entry in layout(kind, mesh)}
         # Of each variable the references by which the inner instance, made for FMI 2.0, knows its scalars.
         runs = scalar_layout(kind, mesh)
-        self._scalars = {run.variable.name: np.arange(run.first, run.first + run.size) for run in runs}
+        self._scalars = {run.variable.name: np.arange(run.first, run.first + run.size, dtype=np.uint32) for run in runs}
         self.time = 0.0
 
     # --- life cycle ---------------------------------------------------------------------------------------------------

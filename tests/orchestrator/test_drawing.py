@@ -119,7 +119,15 @@ def test_a_process_that_cannot_draw_is_told_of_and_spoils_nothing(tmp_path: Path
         assert _is_gone(tmp_path)
         drawing.begin()
         (warning,) = drawing.finish()
-    assert "the process that draws them has ended; all other results are complete" in warning
+    assert "the process that draws them is gone; all other results are complete" in warning
+
+
+def test_where_no_process_can_be_started_there_are_no_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no python"))
+    with Drawing(tmp_path) as drawing:
+        drawing.begin()
+        (warning,) = drawing.finish()
+    assert "are not drawn" in warning
 
 
 def test_a_bug_in_drawing_looks_like_one(tmp_path: Path) -> None:

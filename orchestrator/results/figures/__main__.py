@@ -23,6 +23,8 @@ def main() -> None:
     # Imported here: from now on the process ends with the other one.
     from .draw import draw_figures, draw_still
 
+    # Whatever a library has to say is no answer.
+    answers, sys.stdout = sys.stdout, sys.stderr
     still: dict[str, bytes] = {}
     for line in sys.stdin:
         answer: dict[str, Any] = {}
@@ -35,7 +37,7 @@ def main() -> None:
             answer = {"place": str(error.filename or folder / "figures"), "refused": error.strerror or str(error)}
         except Exception:
             answer = {"bug": traceback.format_exc()}
-        print(json.dumps(answer), flush=True)
+        print(json.dumps(answer), file=answers, flush=True)
 
 
 if __name__ == "__main__":
