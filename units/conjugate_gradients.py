@@ -1,28 +1,41 @@
-"""Conjugate gradients preconditioned by the diagonal, in NumPy.
+"""Preconditioned conjugate gradients in NumPy.
 
 SciPy's take their inner products from BLAS, whose bits depend on the number of threads: a unit would compute other bits
 in a worker process than in the master.
 """
 
+from collections.abc import Callable
+
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import sparray, spmatrix
 
 from .arrays import FloatArray, inner
 
 
 def conjugate_gradients(
-    matrix: csr_matrix, right: FloatArray, guess: FloatArray, tolerance: float, most: int
+    matrix: spmatrix | sparray,
+    right: FloatArray,
+    guess: FloatArray,
+    tolerance: float,
+    most: int,
+    precondition: Callable[[FloatArray], FloatArray] | None = None,
 ) -> FloatArray | None:
     """The solution of a symmetric positive definite system, from a guess; None where `most` iterations do not reach it.
 
-    The residual is then `tolerance` times as large as the right-hand side, shape (n,).
+    The residual is then `tolerance` times as large as the right-hand side, shape (n,). Without `precondition`, which
+    takes residuals to steps, the diagonal does that.
     """
     limit = tolerance**2 * inner(right, right)
     if limit == 0.0:
         return np.zeros_like(right)
-    inverse = 1.0 / matrix.diagonal()
+    if precondition is None:
+        inverse = 1.0 / matrix.diagonal()
+
+        def precondition(residual: FloatArray) -> FloatArray:
+            return inverse * residual
+
     solution, residual = np.array(guess), right - matrix @ guess
-    direction = inverse * residual
+    direction = precondition(residual)
     squared = inner(residual, direction)
     for _ in range(most):
         if inner(residual, residual) <= limit:
@@ -35,7 +48,7 @@ def conjugate_gradients(
         step = squared / stiffness
         solution += step * direction
         residual -= step * image
-        preconditioned = inverse * residual
+        preconditioned = precondition(residual)
         before, squared = squared, inner(residual, preconditioned)
         direction = preconditioned + squared / before * direction
     return None

@@ -3,11 +3,15 @@
 Source: Vaněk, Mandel & Brezina 1996; pyamg's implementation.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from scipy.sparse import bsr_matrix
-from scipy.sparse.linalg import LinearOperator, cg
+from scipy.sparse.linalg import LinearOperator
 
 from ...arrays import FloatArray
+from ...conjugate_gradients import conjugate_gradients
 from ..stiffness import Stiffness
 from .factorisation import NotFactorised, Solve
 
@@ -41,17 +45,29 @@ class Multigrid:
         # Where nodes are free or fixed as a whole, the matrix is one of blocks.
         whole = bool((free == free[:, :1]).all())
         operator = bsr_matrix(full, blocksize=(3, 3)) if whole else full
-        hierarchy = self._hierarchy(
-            operator, B=_rigid_motions(self._points)[free.ravel()], symmetry="symmetric", max_coarse=300
-        )
-        preconditioner: LinearOperator = hierarchy.aspreconditioner(cycle="V")
+        motions = _rigid_motions(self._points)[free.ravel()]
+        with _repeatable():
+            hierarchy = self._hierarchy(operator, B=motions, symmetry="symmetric", max_coarse=300)
+        cycle: LinearOperator = hierarchy.aspreconditioner(cycle="V")
 
         def solve(right: FloatArray) -> FloatArray:
-            # A solve that stops early is a worse preconditioner, which the equilibrium's iteration notices.
-            solution, _ = cg(operator, right, rtol=_TOLERANCE, maxiter=_ITERATIONS, M=preconditioner)
-            return np.asarray(solution)
+            start = np.zeros_like(right)
+            solution = conjugate_gradients(operator, right, start, _TOLERANCE, _ITERATIONS, cycle.matvec)
+            # Where it does not get there, one cycle is a preconditioner still.
+            return np.asarray(cycle.matvec(right)) if solution is None else solution
 
         return solve
+
+
+@contextmanager
+def _repeatable() -> Iterator[None]:
+    """pyamg estimates spectral radii from vectors of NumPy's global generator: here always the same ones."""
+    before = np.random.get_state()  # noqa: NPY002
+    np.random.seed(0)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        np.random.set_state(before)  # noqa: NPY002
 
 
 def _rigid_motions(points: FloatArray) -> FloatArray:
