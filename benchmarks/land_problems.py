@@ -22,12 +22,20 @@ from skfem import MeshTet
 #: Penalty on changes of volume in MPa; with twice of it the tip moves by 2 μm and the apex by 8.
 BULK_MPA = 0.5
 
-_BEAM_LOAD_MPA, _ELLIPSOID_LOAD_MPA = 4e-6, 10e-3
+#: Problem 2: the pressure, and the law's numbers.
+ELLIPSOID_LOAD_KPA = 10.0
+ELLIPSOID_LAW = {
+    "guccione_stiffness_MPa": 0.01,
+    "guccione_fiber": 1.0,
+    "guccione_transverse": 1.0,
+    "guccione_shear": 1.0,
+}
+
+_MPA_PER_KPA = 1e-3
+_BEAM_LOAD_MPA = 4e-6
 _TIP = (10.0, 0.5, 1.0)
 #: Semi-axes (short, long) inside and outside, and the height of the base, in mm.
 _INNER, _OUTER, _BASE_MM = (7.0, 17.0), (10.0, 20.0), 5.0
-_APEX = (0.0, 0.0, -0.5 * (_INNER[1] + _OUTER[1]))
-_ISOTROPIC = {"guccione_fiber": 1.0, "guccione_transverse": 1.0, "guccione_shear": 1.0}
 _TOLERANCE = 1e-6
 
 
@@ -53,39 +61,43 @@ def tip_mm(mesh: Mesh, order: int, bulk_MPa: float = BULK_MPA) -> float:
     return _height(space, newton.solve(rest, loads, Factored(rest, np.zeros_like(loads))).displacement, _TIP)
 
 
-def ellipsoid(through: int) -> Mesh:
-    """A quarter of problem 2, x > 0 and y > 0, with a number of cells through the wall; `endocardium`.
+def ellipsoid(through: int, quarters: int = 1) -> Mesh:
+    """Problem 2, from x > 0 and y > 0 on, with a number of cells through the wall.
 
-    There are eight times as many cells from apex to base, and four times as many around.
+    There are eight times as many cells from apex to base, and four times as many around each of its `quarters`. Its
+    boundaries are `lv_endocardium`, `epicardium` and `base`.
     """
-    axes = (np.linspace(0.0, 1.0, count + 1) for count in (through, 8 * through, 4 * through))
+    axes = (np.linspace(0.0, 1.0, count + 1) for count in (through, 8 * through, 4 * through * quarters))
     grid, cells = _grid(*axes)
     surface = Mesh(grid, cells).surface
-    inner = surface[(grid[surface, 0] == 0.0).all(axis=1)]
+    sides = {"lv_endocardium": (0, 0.0), "epicardium": (0, 1.0), "base": (1, 1.0)}
+    faces = {name: surface[(grid[surface, axis] == end).all(axis=1)] for name, (axis, end) in sides.items()}
     wall, up, around = grid.T
     short, long = (inside + wall * (outside - inside) for inside, outside in zip(_INNER, _OUTER, strict=True))
     angle = np.pi + (np.arccos(_BASE_MM / long) - np.pi) * up
     radius = short * np.sin(angle)
-    moved = np.stack(
-        [radius * np.cos(0.5 * np.pi * around), radius * np.sin(0.5 * np.pi * around), long * np.cos(angle)], axis=1
-    )
+    turn = 0.5 * np.pi * quarters * around
+    moved = np.stack([radius * np.cos(turn), radius * np.sin(turn), long * np.cos(angle)], axis=1)
     # On the planes of symmetry and in that of the base to the bit; rings of nodes at the apex become one node each.
     moved[np.abs(moved) < 1e-9] = 0.0
     moved[up == 1.0, 2] = _BASE_MM
     _, first, numbers = np.unique(np.round(moved, 9), axis=0, return_index=True, return_inverse=True)
     points, numbers = moved[first], numbers.ravel()
-    cells, inner = (_with_distinct_nodes(numbers[simplices]) for simplices in (cells, inner))
-    return Mesh(points, _upright(points, cells), {"endocardium": inner})
+    cells = _upright(points, _with_distinct_nodes(numbers[cells]))
+    return Mesh(points, cells, {name: _with_distinct_nodes(numbers[side]) for name, side in faces.items()})
 
 
-def apex_mm(mesh: Mesh, order: int, bulk_MPa: float = BULK_MPA) -> float:
-    """Problem 2: the height in mm of the apex in the middle of the wall, a node of P1 where the cells are even."""
-    law = Guccione(0.01, guccione_bulk_modulus_MPa=bulk_MPa, **_ISOTROPIC)
+def apex_mm(mesh: Mesh, order: int, bulk_MPa: float = BULK_MPA, through: float = 0.5) -> float:
+    """Problem 2: the height in mm of the apex, by default in the middle of the wall, a node of P1 where cells are even.
+
+    `through` is 0 inside and 1 outside.
+    """
+    law = Guccione(**ELLIPSOID_LAW, guccione_bulk_modulus_MPa=bulk_MPa)
     space = ELEMENTS[order](mesh)
     fixed = space.points == 0.0
     fixed[:, 2] = False
     fixed[space.points[:, 2] == _BASE_MM] = True
-    solid, rest, loads = _loaded(space, mesh, law, fixed, "endocardium", _ELLIPSOID_LOAD_MPA)
+    solid, rest, loads = _loaded(space, mesh, law, fixed, "lv_endocardium", _MPA_PER_KPA * ELLIPSOID_LOAD_KPA)
     equilibrium = Equilibrium(
         solid,
         law.modulus * float(mesh.volumes.mean()) ** (2.0 / 3.0),
@@ -94,7 +106,7 @@ def apex_mm(mesh: Mesh, order: int, bulk_MPa: float = BULK_MPA) -> float:
     )
     unloaded = np.zeros_like(loads)
     found = equilibrium.solve(rest, rest, unloaded, loads, Factored(rest, unloaded))
-    return _height(space, found.displacement, _APEX)
+    return _height(space, found.displacement, (0.0, 0.0, -_INNER[1] - through * (_OUTER[1] - _INNER[1])))
 
 
 class _ByWork(Newton):
