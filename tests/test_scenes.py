@@ -46,7 +46,7 @@ def test_every_scene_runs_and_says_what_one_learns(name: str, tmp_path: Path) ->
         assert file["frames_ms"][-1] == summary["end_ms"]
 
 
-@pytest.mark.parametrize("name", ["cell", "strand", "sheet"])
+@pytest.mark.parametrize("name", ["cell", "strand", "sheet", "inflation"])
 def test_small_scenes_run_through_fmus_with_the_same_bits(name: str, tmp_path: Path) -> None:
     stop = ("run.stop_ms=20",)
     _run(name, tmp_path / "native", *stop)

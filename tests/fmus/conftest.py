@@ -111,6 +111,7 @@ def _cases(mesh: Mesh) -> dict[str, Case]:
     fibers = _native(Case("fiber_generator", mesh, {}, {}, [{}] * 4))[0]
     random = np.random.default_rng(7)
     ranges = {"potential": (-80.0, 20.0), "stretch": (0.95, 1.05), "active_stress": (0.0, 5.0)}
+    ranges |= {"lv_pressure": (0.0, 2.0), "rv_pressure": (0.0, 0.5)}
     cases = {}
     for name, kind in UNITS.items():
         taken = kind.inputs()

@@ -256,7 +256,7 @@ def test_rollback_forgets_what_was_set_scalar_by_scalar(stepping: Any, fmus: dic
     assert driver.step(*stepping.steps[0], stepping.inputs[0]) == 0
     state = driver.fmu.getFMUstate()
     for name in stepping.inputs[0]:
-        driver.fmu.setReal(driver.fields[name][1:2], [0.9])
+        driver.fmu.setReal(driver.fields[name][-1:], [0.9])
     driver.fmu.setFMUstate(state)
     for name, values in stepping.inputs[0].items():
         assert driver.get(name) == values.ravel().tolist()

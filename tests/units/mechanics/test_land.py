@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from land_problems import apex_mm, beam, ellipsoid, tip_mm
+from cardiac_cosim.units.mechanics import Mechanics
+from land_problems import BULK_MPA, ELLIPSOID_LAW, ELLIPSOID_LOAD_KPA, apex_mm, beam, ellipsoid, tip_mm
 
 #: The published answers: the tip's height with what codes differ by, and where the middle of the apex lies.
 _TIP_MM, _APART_MM = 4.17, 0.02
@@ -23,6 +24,24 @@ def test_quadratic_elements_bend_the_beam_as_far_as_published_and_linear_ones_lo
 def test_the_apex_is_where_it_is_published_to_be() -> None:
     assert _APEX_MM[0] < apex_mm(ellipsoid(1), 2) < _APEX_MM[1]
     assert _APEX_MM[0] < apex_mm(ellipsoid(2), 1) < _APEX_MM[1]
+
+
+def test_the_unit_inflates_the_whole_ellipsoid_as_far_as_the_solid_its_quarter(along, started) -> None:
+    # Pressure in kPa, order of the displacement, law and base by the unit's own names.
+    mesh = ellipsoid(1, quarters=4)
+    parameters = {"material": "guccione", "element_order": 2, "guccione_bulk_modulus_MPa": BULK_MPA, **ELLIPSOID_LAW}
+    unit = started(
+        Mechanics,
+        mesh,
+        parameters,
+        lv_pressure=ELLIPSOID_LOAD_KPA,
+        fiber=along(mesh, (1, 0, 0)),
+        sheet=along(mesh, (0, 0, 1)),
+    )
+    outside = apex_mm(ellipsoid(1), 2, through=1.0)
+    assert float(unit.get("apex_uplift")) == pytest.approx(outside + 20.0, abs=0.02)
+    # The quarter fixes, by symmetry, what the whole leaves free; nor does it turn or tilt.
+    np.testing.assert_allclose(unit.get("displacement")[mesh.points[:, 2].argmin(), :2], 0.0, atol=0.05)
 
 
 @pytest.mark.long

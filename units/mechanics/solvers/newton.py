@@ -8,6 +8,8 @@ from .factored import Factored, Factors, NotConverged, Solution, largest
 
 #: Decrease of energy, relative to the slope, that a step has to bring (Armijo).
 _SUFFICIENT = 1e-4
+#: What may be left of the residual's work along the step; a whole step brings it to nearly zero.
+_LESS_WORK = 0.5
 #: Halvings of a step before giving up.
 _HALVINGS = 12
 
@@ -41,7 +43,7 @@ class Newton:
     def search(
         self, displacement: FloatArray, loads: FloatArray, step: FloatArray, energy: float, residual: FloatArray
     ) -> tuple[FloatArray, float, FloatArray]:
-        """A fraction of the Newton step that inverts no element and lowers the energy or the residual."""
+        """A fraction of the Newton step that inverts no element and lowers the energy, or the residual along it."""
         slope = inner(step, residual)
         fraction = 1.0
         for _ in range(_HALVINGS):
@@ -49,9 +51,10 @@ class Newton:
             # A trial that goes much too far overflows; its energy is infinite or NaN, and it is not taken.
             with np.errstate(over="ignore", invalid="ignore"):
                 trial_energy, trial_residual = self._solid.energy_and_residual(trial, loads)
-                smaller = inner(trial_residual, trial_residual) < 0.25 * inner(residual, residual)
-            # Near the minimum the energy's decrease drowns in rounding; there the residual decides.
-            if smaller or trial_energy <= energy + _SUFFICIENT * fraction * slope:
+                less = abs(inner(step, trial_residual)) < _LESS_WORK * abs(slope)
+            # The latter decides near the minimum, where the energy's decrease drowns in rounding, and under loads that
+            # have no potential: a pressure on a surface whose rim moves.
+            if less or trial_energy <= energy + _SUFFICIENT * fraction * slope:
                 return trial, trial_energy, trial_residual
             fraction *= 0.5
         ratio = self._solid.volume_ratio(displacement)
