@@ -10,7 +10,6 @@ import ctypes
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +95,14 @@ def address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]
 
 
-@cache
 def _library() -> ctypes.CDLL | None:
+    return _LOADED
+
+
+def _load() -> ctypes.CDLL | None:
     path = next(iter(sorted(Path(__file__).parent.glob("compiled.*so"))), None)
     return None if path is None else ctypes.CDLL(str(path))
+
+
+# At once, not when it is needed first: an FMU's code outlives the folder it was unpacked to, for other instances.
+_LOADED = _load()

@@ -95,7 +95,8 @@ def test_the_description_does_not_grow_with_the_mesh(unit: str, fmus3: dict, tmp
             sizes.append(archive.getinfo("modelDescription.xml").file_size)
     # More digits in the dimensions, no more.
     assert sizes[1] - sizes[0] < 100
-    assert heart.stat().st_size < 500_000
+    # A fifth of it are the compiled kernels.
+    assert heart.stat().st_size < 600_000
 
 
 def test_the_same_content_makes_the_same_bytes(unit: str, tiny: Mesh, fmus3: dict, tmp_path: Path) -> None:
