@@ -100,3 +100,8 @@ def address(array: np.ndarray) -> int:
 def _library() -> ctypes.CDLL | None:
     path = next(iter(sorted(Path(__file__).parent.glob("compiled.*so"))), None)
     return None if path is None else ctypes.CDLL(str(path))
+
+
+# At once: FMUs of one process share their code, and the files of the one that was loaded first may be gone when another
+# needs a kernel.
+_library()
