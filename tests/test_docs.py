@@ -42,7 +42,7 @@ def test_diffs_that_the_pages_show_are_those_of_the_files() -> None:
             for line in block.split("```")[0].splitlines():
                 if line.startswith("+++ b/"):
                     file = (_ROOT / line.removeprefix("+++ b/")).read_text(encoding="utf-8").splitlines()
-                elif line.startswith("+"):
+                elif line.startswith("+") and line[1:].strip() != "...":
                     assert line[1:] in file, line
                     shown += 1
     assert shown >= 8

@@ -63,7 +63,7 @@ build_fmu(UNITS["mechanics"], unpack_mesh(Path(sys.argv[1])), Path(sys.argv[2]))
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_the_baseline_hearts_fmus_are_small(unit: str, baseline_fmus: dict) -> None:
-    assert baseline_fmus[unit].stat().st_size < 1_000_000
+    assert baseline_fmus[unit].stat().st_size < 1_100_000
 
 
 def test_any_unzipper_makes_readable_files(fmus: dict) -> None:
