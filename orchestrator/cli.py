@@ -145,9 +145,9 @@ def _report(scenario: Scenario, folder: Path, summary: dict[str, Any]) -> None:
         lines.append(f"  activation at {probe}: {'none' if activation is None else f'{activation:.1f} ms'}")
     for chamber, fraction in summary["ejection_fraction"].items():
         volume = summary[f"{chamber}_volume_ml"]
-        lines.append(
-            f"  {chamber} volume: {volume['start']:.2f} -> {volume['min']:.2f} ml, ejection fraction {fraction:.2f}"
-        )
+        ejects = volume["min"] < volume["start"]
+        then = f"{volume['min']:.2f} ml, ejection fraction {fraction:.2f}" if ejects else f"{volume['max']:.2f} ml"
+        lines.append(f"  {chamber} volume: {volume['start']:.2f} -> {then}")
     lines.append(f"  results in {folder}")
     typer.echo("\n".join(lines))
     late, missed = summary["unconverged_ms"], summary["tolerance_missed"]

@@ -9,6 +9,7 @@ from cardiac_cosim.orchestrator.participants.participant import Values
 from cardiac_cosim.orchestrator.results.figures.draw import draw_figures
 from cardiac_cosim.orchestrator.results.figures.fiber_layout import fiber_lines, helix_angle
 from cardiac_cosim.orchestrator.results.figures.heart_potential import chosen_frames
+from cardiac_cosim.orchestrator.results.figures.pressure_volume import pressure_volume
 from cardiac_cosim.orchestrator.results.figures.scene import View, shaded, strokes
 from cardiac_cosim.orchestrator.results.figures.stored_run import StoredRun
 from cardiac_cosim.orchestrator.results.figures.surface import normals, section, sharp_edges, smoothing, surface
@@ -20,7 +21,7 @@ _POINTS = 10.0 * np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0
 _CELLS = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
 _GREY = ScalarMappable(Normalize(0.0, 10.0), "gray")
 _PNG_START = b"\x89PNG"
-_ALL = ["fiber_layout", "potential_on_deformed_heart", "potential_at_probes", "cavity_volumes"]
+_ALL = ["fiber_layout", "potential_on_deformed_heart", "potential_at_probes", "cavity_volumes", "pressure_volume"]
 
 
 def _write_fields(folder: Path, times: tuple[float, ...], *without: str, prefix: str = "") -> None:
@@ -50,13 +51,26 @@ def _names(drawn: list[Path]) -> list[str]:
 
 def test_every_figure_is_drawn_from_what_a_run_leaves(tmp_path: Path) -> None:
     _write_fields(tmp_path, (0.0, 5.0))
-    _write_series(tmp_path, "time_ms,potential_apex_mV,lv_volume_ml\n0.0,-80.0,38.0\n5.0,-79.0,37.5\n")
+    columns = "time_ms,potential_apex_mV,lv_volume_ml,lv_pressure_kPa"
+    _write_series(tmp_path, f"{columns}\n0.0,-80.0,38.0,0.0\n5.0,-79.0,37.5,0.1\n")
     drawn = draw_figures(tmp_path)
     assert _names(drawn) == _ALL
     for path in drawn:
         assert path.parent == tmp_path / "figures"
         assert path.read_bytes().startswith(_PNG_START)
         assert path.stat().st_size > 5000
+
+
+def test_pressure_is_drawn_over_the_volume_of_its_own_cavity(tmp_path: Path) -> None:
+    # Gaps are of units that step less often; a pressure that nobody changes makes no curve.
+    names = "time_ms,lv_volume_ml,rv_pressure_kPa,lv_pressure_kPa,rv_volume_ml"
+    _write_series(tmp_path, f"{names}\n0.0,38.0,1.0,0.0,12.0\n5.0,,1.0,0.5,13.0\n9.0,40.0,1.0,1.5,14.0\n")
+    figure = pressure_volume(StoredRun(tmp_path))
+    assert figure is not None
+    curve, begin = figure.axes[0].lines
+    assert curve.get_label() == "LV"
+    np.testing.assert_array_equal(curve.get_xydata(), [[38.0, 0.0], [40.0, 1.5]])
+    np.testing.assert_array_equal(begin.get_xydata(), [[38.0, 0.0]])
 
 
 @pytest.mark.parametrize(

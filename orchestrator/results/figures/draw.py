@@ -11,6 +11,7 @@ from ..whole import write_whole
 from .fiber_layout import fiber_layout
 from .heart_potential import heart_potential
 from .lines import cavity_volumes, probe_potential
+from .pressure_volume import pressure_volume
 from .stored_run import StoredRun
 
 #: Each figure by its file name; one that finds no data in the run returns None.
@@ -19,6 +20,7 @@ FIGURES: dict[str, Callable[[StoredRun], Figure | None]] = {
     "potential_on_deformed_heart": heart_potential,
     "potential_at_probes": probe_potential,
     "cavity_volumes": cavity_volumes,
+    "pressure_volume": pressure_volume,
 }
 
 _DOTS_PER_INCH = 160
