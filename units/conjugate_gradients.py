@@ -37,8 +37,10 @@ def conjugate_gradients(
     solution, residual = np.array(guess), right - matrix @ guess
     direction = precondition(residual)
     squared = inner(residual, direction)
-    for _ in range(most):
-        if inner(residual, residual) <= limit:
+    for iteration in range(most):
+        left = inner(residual, residual)
+        # A guess is improved once at least, so that a solution does not hang on whether it has just met the tolerance.
+        if left <= limit and (iteration or left == 0.0):
             return solution
         image = matrix @ direction
         stiffness = inner(direction, image)

@@ -42,7 +42,8 @@ static double VARIANT(multiply)(const struct pattern *pattern, const double *res
 }
 
 /* Solves A x = right from the guess in x until the residual is `tolerance` times as large as `right`; leaves the residual
-   in `residual`. Work space of 2 vectors. Returns how many iterations it took, -1 where `most` are not enough. */
+   in `residual`. Unless the guess is exact it is improved once at least: where the matrix is a diagonal that is exact, and
+   elsewhere a solution does not hang on whether a guess has just met the tolerance. Work space of 2 vectors. Returns how many iterations it took, -1 where `most` are not enough. */
 static int VARIANT(conjugate_gradients)(const struct pattern *pattern, const double *matrix, const double *restrict inverse,
                                         const double *restrict right, double *restrict x, double *restrict residual,
                                         double *work, double tolerance, int64_t most)
@@ -68,7 +69,7 @@ static int VARIANT(conjugate_gradients)(const struct pattern *pattern, const dou
         return 0;
     }
     for (int64_t iteration = 0; iteration < most && rr < (double)INFINITY; iteration++) {
-        if (rr <= limit)
+        if (rr <= limit && (iteration || rr == 0.0))
             return (int)iteration;
         const double step = rz / VARIANT(multiply)(pattern, matrix, direction, image);
         ROW square[l] = preconditioned[l] = 0.0;
