@@ -3,6 +3,7 @@
 #include "vector_math.h"
 #include "solid.h"
 #include "quasi_newton.h"
+#include "predictor.h"
 #include "ionic.h"
 #include "conjugate_gradients.h"
 #include "monodomain.h"

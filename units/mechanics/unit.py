@@ -38,7 +38,7 @@ from .solid import Solid
 from .solvers.choice import LinearSolver
 from .solvers.equilibrium import Convergence, Equilibrium
 from .solvers.factored import Factored
-from .solvers.predictor import MEMORY, predicted
+from .solvers.predictor import MEMORY, Predictor
 
 _MPA_PER_KPA = 1e-3
 _ML_PER_MM3 = 1e-3
@@ -134,6 +134,7 @@ class Mechanics(Unit):
         self._equilibrium = Equilibrium(
             self._solid, self._modulus * element_size**2, self.parameters(Convergence), self._factorisation
         )
+        self._predictor = Predictor(self._solid.loads, mesh.nodes, float(np.sqrt(mesh.nodes)))
         self._apex = int(mesh.points[:, 2].argmin())
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
@@ -166,10 +167,9 @@ class Mechanics(Unit):
         """Equilibrium under the loads at the end of the step; a memoryless map but for its starting guess."""
         loads, start = self._loads(inputs), state["displacement"]
         change = loads - state["loads"]
-        # The changes are remembered with their sizes per node, so that a pressure counts as much as all active stress.
-        foreseen = predicted(
-            self._weighted(change),
-            [self._weighted(state[load]) for load, _ in _CHANGES],
+        foreseen = self._predictor(
+            change,
+            [state[load] for load, _ in _CHANGES],
             [state[displacement] for _, displacement in _CHANGES],
         )
         factored = Factored(state["factored_displacement"], state["factored_loads"], int(state["factors_spent"]))
@@ -209,13 +209,6 @@ class Mechanics(Unit):
         """Active stress at the nodes, then the pressures in the cavities, in MPa, shape (loads,)."""
         pressures = [inputs[_PRESSURES[name]] for name in self._cavities]
         return frozen(_MPA_PER_KPA * np.concatenate([inputs["active_stress"], *(np.atleast_1d(p) for p in pressures)]))
-
-    def _weighted(self, loads: FloatArray) -> FloatArray:
-        if not self._cavities:
-            return loads
-        weighted = loads.copy()
-        weighted[self.mesh.nodes :] *= np.sqrt(self.mesh.nodes)
-        return weighted
 
 
 #: The last changes of loads and of displacement in the state, the latest first.

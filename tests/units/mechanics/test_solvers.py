@@ -4,6 +4,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from cardiac_cosim.units import kernels
 from cardiac_cosim.units.errors import InvalidInput, StepFailure
 from cardiac_cosim.units.fiber_generator import FiberGenerator
 from cardiac_cosim.units.mechanics import Mechanics
@@ -16,7 +17,7 @@ from cardiac_cosim.units.mechanics.solvers import choice
 from cardiac_cosim.units.mechanics.solvers.choice import LinearSolver
 from cardiac_cosim.units.mechanics.solvers.factored import NotConverged
 from cardiac_cosim.units.mechanics.solvers.factorisation import NotFactorised
-from cardiac_cosim.units.mechanics.solvers.predictor import predicted
+from cardiac_cosim.units.mechanics.solvers.predictor import Predictor
 from cardiac_cosim.units.mechanics.stiffness import Stiffness
 from cardiac_cosim.units.mesh import Mesh
 
@@ -112,29 +113,39 @@ def test_meshes_too_large_for_factors_get_multigrid(solid: Solid, monkeypatch: p
 # --- the first guess -----------------------------------------------------------------------------------------------
 
 
-def test_guess_is_exact_where_displacements_follow_linearly_and_the_change_is_in_the_span() -> None:
+@pytest.fixture(params=[*kernels.available(), kernels.WITHOUT])
+def predictor(request: pytest.FixtureRequest) -> Predictor:
+    """Of twenty loads, the last of which weighs as much as three others."""
+    with kernels.using(request.param):
+        return Predictor(20, 19, 3.0)
+
+
+def test_guess_is_exact_where_displacements_follow_linearly_and_the_change_is_in_the_span(
+    predictor: Predictor,
+) -> None:
     random = np.random.default_rng(4)
     response = random.standard_normal((12, 3, 20))
     changes = list(random.standard_normal((4, 20)))
     moved = [response @ change for change in changes]
     new = 0.3 * changes[0] - 2.0 * changes[1] + changes[3]
-    np.testing.assert_allclose(predicted(new, changes, moved), response @ new, atol=1e-12)
+    np.testing.assert_allclose(predictor(new, changes, moved), response @ new, atol=1e-12)
     # Of what is outside of the span nothing is known.
-    basis, _ = np.linalg.qr(np.array(changes).T)
+    weights = np.where(np.arange(20) < 19, 1.0, 3.0)
+    basis, _ = np.linalg.qr((weights * np.array(changes)).T)
     outside = random.standard_normal(20)
     outside -= basis @ (basis.T @ outside)
-    np.testing.assert_allclose(predicted(outside, changes, moved), 0.0, atol=1e-12)
+    np.testing.assert_allclose(predictor(outside / weights, changes, moved), 0.0, atol=1e-12)
 
 
-def test_guess_does_not_blow_noise_up() -> None:
+def test_guess_does_not_blow_noise_up(predictor: Predictor) -> None:
     # Changes that are the same but for rounding, with displacements that are the same but for a tolerance.
     random = np.random.default_rng(5)
     change, moved = random.standard_normal(20), random.standard_normal((12, 3))
     changes = [change * (1.0 + 1e-9 * random.standard_normal(20)) for _ in range(4)]
-    found = predicted(2.0 * change, changes, [moved + 1e-6 * random.standard_normal(moved.shape) for _ in changes])
+    found = predictor(2.0 * change, changes, [moved + 1e-6 * random.standard_normal(moved.shape) for _ in changes])
     np.testing.assert_allclose(found, 2.0 * moved, atol=1e-5)
     nothing = np.zeros(20)
-    assert not predicted(change, [nothing] * 4, [np.zeros((12, 3))] * 4).any()
+    assert not predictor(change, [nothing] * 4, [np.zeros((12, 3))] * 4).any()
 
 
 # --- equilibria of a heart -----------------------------------------------------------------------------------------

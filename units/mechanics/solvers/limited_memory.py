@@ -25,6 +25,8 @@ class LimitedMemory:
         if self._compiled:
             self._before = kernels.kernel("quasi_newton_before", integers=4, pointers=5)
             self._after = kernels.kernel("quasi_newton_after", integers=4, pointers=5)
+            arrays = self._steps, self._changes, self._curvature, self._alpha
+            self._addresses = tuple(map(kernels.address, arrays))
 
     def forget(self) -> None:
         """Begin anew, with another preconditioner or elsewhere."""
@@ -45,10 +47,9 @@ class LimitedMemory:
         direction = -residual
         if self._compiled:
             given = self._size, _MEMORY, self._count, self._next
-            pairs = tuple(map(kernels.address, (self._steps, self._changes, self._curvature, self._alpha)))
-            self._before(*given, *pairs, kernels.address(direction))
+            self._before(*given, *self._addresses, kernels.address(direction))
             direction = np.ascontiguousarray(solve(direction))
-            self._after(*given, *pairs, kernels.address(direction))
+            self._after(*given, *self._addresses, kernels.address(direction))
             return direction
         rows = [(self._next - back) % _MEMORY for back in range(1, self._count + 1)]
         for row in rows:

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from ...arrays import FloatArray, frozen
 from ..solid import Solid
 from .factored import Factored, Factors, NotConverged, Solution, largest
@@ -39,9 +41,10 @@ class QuasiNewton:
                 self._memory.forget()
             step = self._memory.step(residual, self._factors.at(factored))
             displacement = self._solid.moved(displacement, step)
-            before, residual = residual, self._solid.residual(displacement, loads)
-            if residual is None or not largest(residual) <= _MOST_GROWTH * size:
+            earlier, residual = residual, self._solid.residual(displacement, loads)
+            before, size = size, np.inf if residual is None else largest(residual)
+            if residual is None or not size <= _MOST_GROWTH * before:
                 raise NotConverged("the quasi-Newton method diverges")
-            self._memory.remember(step, residual - before)
-            size, since = largest(residual), since + 1
+            self._memory.remember(step, residual - earlier)
+            since += 1
         raise NotConverged(f"the quasi-Newton method left a residual of {size:.3g} N (limit {self._limit:.3g} N)")
