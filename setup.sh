@@ -9,6 +9,8 @@ cd "$(dirname "$0")"
 # Python, and for the tests, which build FMUs and a host in C and mesh the heart, a compiler and the shared libraries that gmsh's
 # and ecospy's wheels, and hosts without Python, leave to the system.
 packages="python3 python3-venv"
+# With a compiler the inner loops are compiled, and hearts beat several times as fast; without one NumPy computes them.
+useful="gcc libc6-dev"
 [ "${1:-}" = test ] && packages="$packages gcc libc6-dev libgl1 libglu1-mesa libgomp1 libpython3-dev libtbb12 libxcursor1 libxft2 libxinerama1 unzip"
 
 missing=""
@@ -20,6 +22,15 @@ fi
 # A Python that can make environments will do, wherever it came from.
 if command -v python3 >/dev/null && python3 -c 'import ensurepip, venv' 2>/dev/null; then
     missing=$(echo "$missing" | sed 's/ python3-venv//; s/ python3//')
+fi
+if command -v cc >/dev/null; then
+    useful=""
+fi
+if [ -n "$useful" ] && command -v dpkg-query >/dev/null && { [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; }; then
+    missing="$missing $useful"
+elif [ -n "$useful" ]; then
+    echo "setup: there is no C compiler, so that NumPy will compute everything, several times slower; with one (apt-get" \
+        "install $useful), set up again" >&2
 fi
 if [ -n "$missing" ]; then
     if [ "$(id -u)" = 0 ]; then
