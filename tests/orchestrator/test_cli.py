@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 import pytest
 from cardiac_cosim.units.mesh.file import write_mesh
+from fallbacks import without_fallbacks
 
 Cosim = Callable[..., Any]
 
@@ -53,9 +54,11 @@ def _numbers(folder: Path) -> dict[str, np.ndarray]:
 
 
 def _process(*arguments: object, **options: Any) -> Any:
-    return subprocess.run(
+    ended = subprocess.run(
         [*_COMMAND, *map(str, arguments), "--no-figures"], capture_output=True, text=True, timeout=60, **options
     )
+    ended.stderr = without_fallbacks(ended.stderr)
+    return ended
 
 
 def test_exit_codes_as_a_shell_sees_them(small_scenario: Path, tmp_path: Path) -> None:

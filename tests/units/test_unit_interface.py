@@ -642,7 +642,7 @@ _SPECIAL: dict[tuple[str, str], dict[str, Any]] = {
     ("electrophysiology", "activation_potential_mV"): {"activation_potential_mV": -5.0},
     ("electrophysiology", "longest_substep_ms"): {"longest_substep_ms": 0.05},
     ("mechanics", "element_order"): {"element_order": 2},
-    ("mechanics", "linear_solver"): {"linear_solver": "superlu"},
+    ("mechanics", "linear_solver"): {"linear_solver": "multigrid"},
     ("mechanics", "equilibrium_tolerance"): {"equilibrium_tolerance": 1e-3},
     ("eikonal", "stimulus_x_min_mm"): {"stimulus_x_min_mm": 6.0},
     ("eikonal", "stimulus_x_max_mm"): {"stimulus_x_max_mm": 7.0},

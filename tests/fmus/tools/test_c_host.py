@@ -15,6 +15,7 @@ from cardiac_cosim.fmus.build import build_fmu
 from cardiac_cosim.orchestrator.assembly import checked_mesh
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.units import kernels
 from cardiac_cosim.units.registry import UNITS
 
 _HERE = Path(__file__).parent
@@ -23,6 +24,9 @@ _STEPS = 60
 _COLUMNS = {"potential_max": "potential_cell_mV", "active_stress_mean": "active_stress_mean_kPa"}
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+#: Which kernels our own numbers are computed with, if that was chosen.
+_KERNELS = {name: os.environ[name] for name in (kernels.CHOICE,) if name in os.environ}
 
 
 @pytest.fixture(scope="session")
@@ -60,7 +64,11 @@ def run(host: Path, cell: list[Path]) -> Run:
         parameter = "electrophysiology.time_scale_reduction=0"
         command = [str(host), "0.001", str(steps), *map(str, cell), "--set", parameter, *words]
         return subprocess.run(
-            command, capture_output=True, text=True, timeout=60, env={"PATH": os.environ["PATH"]} | environment
+            command,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            env={"PATH": os.environ["PATH"]} | _KERNELS | environment,
         )
 
     return call
