@@ -55,9 +55,9 @@ def _milliseconds(fmu: Path) -> tuple[float, float, float]:
     return 1e3 * median(setting), 1e3 * median(reading), made
 
 
-def _heart_milliseconds(fmi: int, folder: Path) -> float:
+def heart_milliseconds(fmi: int, folder: Path, size_mm: float = 5.0) -> float:
     """Median over the steps of reading potential, active stress and stretch, and setting each where it goes, in ms."""
-    heart = build("biventricle", 5.0)
+    heart = build("biventricle", size_mm)
     ways = {
         "electrophysiology": ("potential", "active_stress"),
         "active_stress": ("active_stress", "mechanics"),
@@ -87,7 +87,7 @@ def _heart_milliseconds(fmi: int, folder: Path) -> float:
 
 def _row(mesh: Mesh, fmi: int, binary: str) -> str:
     with TemporaryDirectory() as folder:
-        step = _heart_milliseconds(fmi, Path(folder))
+        step = heart_milliseconds(fmi, Path(folder))
         path = cached_fmu(UNITS["active_stress"], mesh, Path(folder), fmi)
         setting, reading, made = _milliseconds(path)
         with zipfile.ZipFile(path) as archive:

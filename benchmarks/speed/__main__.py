@@ -55,7 +55,8 @@ def _measure(sizes: list[float]) -> list[dict[str, Any]]:
     found = [_measured("heartbeat", size, "native", 320) for size in sizes]
     if _BASELINE in sizes:
         found += [_measured("heartbeat", _BASELINE, kind, 320) for kind in ("fmu", "fmu3")]
-    found += [_measured("solid", size) for size in sizes]
+    for kind in ("solid", "exchange"):
+        found += [_measured(kind, size) for size in sizes]
     fine = [*sizes, _FINEST] if sizes == list(_SIZES) else sizes
     return found + [_measured("electrophysiology", size, 20) for size in fine]
 

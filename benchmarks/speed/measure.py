@@ -3,6 +3,7 @@
 python -m benchmarks.speed.measure heartbeat 5 fmu 320
 python -m benchmarks.speed.measure electrophysiology 2 20
 python -m benchmarks.speed.measure solid 5
+python -m benchmarks.speed.measure exchange 5
 """
 
 import json
@@ -21,6 +22,7 @@ from cardiac_cosim.units.electrophysiology import Electrophysiology
 from cardiac_cosim.units.geometry.registry import build
 from cardiac_cosim.units.mesh import Mesh
 
+from ..exchange_cost import heart_milliseconds
 from .factorisation import factorisation_ms, fibers_of, shortest_ms, solid_of
 
 _SCENARIO = Path(__file__).parent.parent.parent / "scenarios" / "baseline.yaml"
@@ -88,6 +90,13 @@ def solid(size_mm: float) -> dict[str, Any]:
     }
 
 
+def exchange(size_mm: float) -> dict[str, Any]:
+    """The three fields of a step, read from one unit's FMU and set in the next one's, in ms."""
+    with TemporaryDirectory() as folder:
+        times = {f"fmi{fmi}_ms": heart_milliseconds(fmi, Path(folder), size_mm) for fmi in (2, 3)}
+    return _size(build("biventricle", size_mm)) | times
+
+
 def _size(mesh: Mesh) -> dict[str, Any]:
     return {"nodes": mesh.nodes, "elements": mesh.elements}
 
@@ -101,6 +110,7 @@ _MEASURES: dict[str, Callable[..., dict[str, Any]]] = {
     "heartbeat": heartbeat,
     "electrophysiology": electrophysiology,
     "solid": solid,
+    "exchange": exchange,
 }
 
 

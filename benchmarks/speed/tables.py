@@ -18,6 +18,7 @@ def tables(record: dict[str, Any]) -> str:
         _heartbeats(measured),
         _growth(measured),
         _solids(measured),
+        _exchanges(measured),
         _electrophysiology(measured),
     ]
     return "\n\n".join(part for part in parts if part)
@@ -99,6 +100,14 @@ def _solids(measured: list[Measured]) -> str:
         for one in of_kind(measured, "solid")
     ]
     return _table(("mechanics, ms", "residual", "tangent", "stretch"), rows)
+
+
+def _exchanges(measured: list[Measured]) -> str:
+    rows = [
+        [f"{one['size_mm']:g} mm", f"{one['elements']}", f"{one['fmi2_ms']:.2f}", f"{one['fmi3_ms']:.2f}"]
+        for one in of_kind(measured, "exchange")
+    ]
+    return _table(("fields of a step, ms", "elements", "FMI 2.0", "FMI 3.0"), rows)
 
 
 def _electrophysiology(measured: list[Measured]) -> str:
