@@ -24,14 +24,13 @@ def draw(record: dict[str, Any], path: Path) -> None:
         left.loglog(unknowns, seconds, marker=marker, label=name)
     for one in beats:
         text = f"{one['size_mm']:g} mm\n{factorisations(one):.0f} factorisations"
-        above = (0.0, 8.0)
-        left.annotate(
-            text, (one["unknowns"], one["loop_s"]), above, textcoords="offset points", ha="center", fontsize=8
-        )
+        place = {"xytext": (-7.0, 3.0), "textcoords": "offset points", "ha": "right", "fontsize": 8}
+        left.annotate(text, (one["unknowns"], one["loop_s"]), **place)
     left.axhline(0.32, color="0.6", linestyle=":", linewidth=1.0)
     left.annotate("real time", (unknowns[-1], 0.32), (0.0, 3.0), textcoords="offset points", ha="right", fontsize=8)
     left.set(xlabel="unknowns of the mechanics", ylabel="seconds for a heartbeat of 320 ms", title="Whole heartbeat")
-    left.margins(x=0.12, y=0.18)
+    left.set_xlim(unknowns[0] / 5.0, unknowns[-1] * 1.5)
+    left.margins(y=0.12)
     left.legend(fontsize=8, loc="lower right")
     elements = [one["elements"] for one in alone]
     right.loglog(elements, [one["ms_per_step"] for one in alone], "D-", label="a step of 1 ms")
