@@ -275,7 +275,7 @@ class Run(_Section):
     participants: Literal["fmu", "fmu3", "native"] = "fmu"
     workers: Annotated[str | None, Field(pattern=WORKERS)] = None
     unit_time_limit_s: Positive | None = None
-    checkpoint_every: Annotated[int, Field(ge=0, le=_MOST)] = 20
+    checkpoint_every: Annotated[int, Field(ge=0, le=_MOST)] = 50
 
     @model_validator(mode="after")
     def _limited(self) -> "Run":
