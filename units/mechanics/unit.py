@@ -22,7 +22,7 @@ from ..arrays import FloatArray, IntArray, frozen
 from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
 from ..mesh import Mesh
-from ..mesh.cavity import Cavity
+from ..mesh.cavity import cavity_faces
 from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
@@ -94,7 +94,7 @@ class Mechanics(Unit):
         if mesh.dimension == 3:
             mesh.boundary("base")
             for surfaces in wall_of(mesh).cavities.values():
-                Cavity(mesh, surfaces)
+                cavity_faces(mesh, surfaces)
 
     def implementation(self) -> str:
         """What computes: kernels and linear solver."""
@@ -117,11 +117,10 @@ class Mechanics(Unit):
         space = self.parameters(Elements).space(mesh)
         laws = [self.parameters(law) for law in self.parameters(Material).laws]
         self._modulus = max(law.modulus for law in laws)
-        surfaces = {
-            name: np.concatenate([mesh.boundary(part) for part in parts])
-            for name, parts in wall_of(mesh).cavities.items()
+        self._cavities = {
+            name: CavityPressure(space, cavity_faces(mesh, surfaces))
+            for name, surfaces in wall_of(mesh).cavities.items()
         }
-        self._cavities = {name: CavityPressure(space, faces) for name, faces in surfaces.items()}
         self._solid = Solid(
             space,
             Tissue(fiber, sheet, laws, self.parameters(ActiveShares).tensor(fiber, sheet)),

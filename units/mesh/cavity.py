@@ -1,8 +1,8 @@
-"""Volume of a cavity by Gauss's theorem over its wall; the opening at the base needs no lid."""
+"""The wall of a cavity that is open at the base, by whose faces alone its volume is known: the opening needs no lid."""
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import IntArray
 from ..errors import InvalidInput
 from .simplices import Mesh
 
@@ -12,28 +12,24 @@ _ML_PER_MM3 = 1e-3
 _FLAT_RIM_MM = 1e-3
 
 
-class Cavity:
-    """The cavity bounded by some boundaries of a mesh and open at the base.
+def cavity_faces(mesh: Mesh, boundaries: tuple[str, ...]) -> IntArray:
+    """The wall of the cavity behind `boundaries`, open at the base, by its faces, normals out of the tissue.
 
     With n out of the tissue, the volume is −∫ x n_x over the wall. The opening adds nothing as long as its normal is
-    the Z axis: the rim has to lie on the base, which does not move, and in one plane Z = constant. Both are checked.
+    the Z axis: the rim has to lie on the base, which does not move, and in one plane Z = constant.
+
+    Raises
+    ------
+    InvalidInput
+        Where it does not, and for what `checked_rim` refuses.
     """
-
-    def __init__(self, mesh: Mesh, boundaries: tuple[str, ...]) -> None:
-        self._faces = np.concatenate([mesh.boundary(name) for name in boundaries])
-        rim = checked_rim(mesh, boundaries)
-        if len(rim) and np.ptp(mesh.points[rim, 2]) > _FLAT_RIM_MM:
-            raise InvalidInput(
-                f"the rim of the surface {' + '.join(boundaries)} at the base runs over "
-                f"{np.ptp(mesh.points[rim, 2]):.3g} mm in Z; it has to lie in one plane Z = constant"
-            )
-
-    def volume(self, points: FloatArray) -> float:
-        """Volume in ml with the nodes at `points` (mm), shape (nodes, 3). Exact for the facetted surface."""
-        corner, second, third = points[self._faces].transpose(1, 0, 2)
-        normal = 0.5 * np.cross(second - corner, third - corner)
-        mean_x = (corner[:, 0] + second[:, 0] + third[:, 0]) / 3.0
-        return -_ML_PER_MM3 * float(mean_x @ normal[:, 0])
+    rim = checked_rim(mesh, boundaries)
+    if len(rim) and np.ptp(mesh.points[rim, 2]) > _FLAT_RIM_MM:
+        raise InvalidInput(
+            f"the rim of the surface {' + '.join(boundaries)} at the base runs over "
+            f"{np.ptp(mesh.points[rim, 2]):.3g} mm in Z; it has to lie in one plane Z = constant"
+        )
+    return _faces(mesh, boundaries)
 
 
 def checked_rim(mesh: Mesh, boundaries: tuple[str, ...]) -> IntArray:
@@ -44,7 +40,7 @@ def checked_rim(mesh: Mesh, boundaries: tuple[str, ...]) -> IntArray:
     InvalidInput
         Where it is open elsewhere than at the base, or encloses nothing: the surface seen from the other side.
     """
-    faces = np.concatenate([mesh.boundary(name) for name in boundaries])
+    faces = _faces(mesh, boundaries)
     rim = rim_of(faces)
     wall = " + ".join(boundaries)
     stray = np.setdiff1d(rim, mesh.boundary_nodes("base")) if len(rim) else rim
@@ -70,3 +66,7 @@ def rim_of(faces: IntArray) -> IntArray:
     edges = np.sort(faces[:, ((0, 1), (1, 2), (2, 0))], axis=2).reshape(-1, 2)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     return np.unique(unique[count == 1])
+
+
+def _faces(mesh: Mesh, boundaries: tuple[str, ...]) -> IntArray:
+    return np.concatenate([mesh.boundary(name) for name in boundaries])
