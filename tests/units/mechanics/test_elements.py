@@ -8,15 +8,14 @@ from cardiac_cosim.units.geometry import registry
 from cardiac_cosim.units.mechanics import Mechanics
 from cardiac_cosim.units.mechanics.elements.linear import linear
 from cardiac_cosim.units.mechanics.elements.registry import ELEMENTS
-from cardiac_cosim.units.mechanics.kinematics import Kinematics
 from cardiac_cosim.units.mechanics.laws.guccione import Guccione
 from cardiac_cosim.units.mechanics.laws.holzapfel_fiber import HolzapfelFiber
 from cardiac_cosim.units.mechanics.laws.neo_hooke import NeoHooke
-from cardiac_cosim.units.mechanics.loads.active_stress import ActiveShares
 from cardiac_cosim.units.mechanics.loads.cavity_pressure import CavityPressure
 from cardiac_cosim.units.mechanics.loads.springs import Springs
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.mesh.cavity import cavity_faces
+from manufactured import FIBER, SHEET, body_force, exact, exact_gradient, exact_tension, nominal_stress
 from scipy.sparse.linalg import spsolve
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
@@ -116,53 +115,10 @@ def test_residual_and_tangent_of_the_whole_solid_are_derivatives(laws, order: in
 
 # --- convergence under refinement ----------------------------------------------------------------------------------
 
-_AMPLITUDE = np.array([0.06, -0.05, 0.04])
 _PRESSURE = 0.05
-_FIBER, _SHEET = np.array([0.6, 0.8, 0.0]), np.array([0.0, 0.0, 1.0])
 #: Exact to degree 6: what is integrated here is not to be blamed.
 _PLACES, _WEIGHTS = get_quadrature(RefTet, 6)
 _BARYCENTRIC = np.column_stack([1.0 - _PLACES.sum(axis=0), *_PLACES])
-
-
-def _exact(at: np.ndarray) -> np.ndarray:
-    x, y, z = at.T
-    return (np.sin(np.pi * x) * np.cos(2.0 * y) * np.exp(0.5 * z) + x * y)[:, None] * _AMPLITUDE
-
-
-def _exact_gradient(at: np.ndarray) -> np.ndarray:
-    x, y, z = at.T
-    grow = np.exp(0.5 * z)
-    slope = np.stack(
-        [
-            np.pi * np.cos(np.pi * x) * np.cos(2.0 * y) * grow + y,
-            -2.0 * np.sin(np.pi * x) * np.sin(2.0 * y) * grow + x,
-            0.5 * np.sin(np.pi * x) * np.cos(2.0 * y) * grow,
-        ],
-        axis=1,
-    )
-    return np.eye(3) + _AMPLITUDE[None, :, None] * slope[:, None, :]
-
-
-def _tension(at: np.ndarray) -> np.ndarray:
-    return 0.2 * (1.0 + at[:, 0] - 0.5 * at[:, 2])
-
-
-def _nominal(at: np.ndarray) -> np.ndarray:
-    """P = F S in MPa, shape (points, 3, 3)."""
-    gradient = _exact_gradient(at)
-    structures = (np.broadcast_to(np.outer(axis, axis), gradient.shape) for axis in (_FIBER, _SHEET))
-    kinematics = Kinematics.of(gradient, np.linalg.det(gradient), *structures)
-    active = ActiveShares().tensor(_FIBER[None], _SHEET[None])
-    return gradient @ (sum(law.stress(kinematics) for law in _LAWS) + _tension(at)[:, None, None] * active)
-
-
-def _body_force(at: np.ndarray) -> np.ndarray:
-    """−Div P by central differences of fourth order, which leave errors of 1e-10."""
-    force, step = np.zeros_like(at), 2e-3
-    for axis in range(3):
-        for shift, weight in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
-            force -= weight / (12.0 * step) * _nominal(at + shift * step * np.eye(3)[axis])[:, :, axis]
-    return force
 
 
 def _l2_error(order: int, cells: int, box, along, solid_of) -> float:
@@ -176,13 +132,13 @@ def _l2_error(order: int, cells: int, box, along, solid_of) -> float:
         lambda at: np.repeat(
             (at[:, :2] * (1.0 - at[:, :2]) > 1e-9).all(axis=1, keepdims=True) & (at[:, 2:] > 0.0), 3, 1
         ),
-        directions=(along(mesh, _FIBER), along(mesh, _SHEET)),
+        directions=(along(mesh, FIBER), along(mesh, SHEET)),
         pressures=[lambda space: CavityPressure(space, mesh.boundary("top"))],
     )
     space, shape = solid.space, _shape(order, _BARYCENTRIC)
     load = np.zeros_like(space.points)
     for weight, vertices, values in zip(6.0 * _WEIGHTS, _BARYCENTRIC, shape, strict=True):
-        force = weight * mesh.volumes[:, None] * _body_force(np.einsum("a,eai->ei", vertices, mesh.points[mesh.cells]))
+        force = weight * mesh.volumes[:, None] * body_force(np.einsum("a,eai->ei", vertices, mesh.points[mesh.cells]))
         for node, value in enumerate(values):
             np.add.at(load, space.nodes[:, node], value * force)
     # What the exact traction is beyond −p cof(F) N.
@@ -191,13 +147,13 @@ def _l2_error(order: int, cells: int, box, along, solid_of) -> float:
     nodes = space.face_nodes(faces)
     for weight, values in zip(rule.weights, rule.values, strict=True):
         at = np.einsum("a,fai->fi", values, space.points[nodes])
-        gradient = _exact_gradient(at)
+        gradient = exact_gradient(at)
         cofactor = np.linalg.det(gradient)[:, None, None] * np.linalg.inv(gradient).transpose(0, 2, 1)
-        traction = _nominal(at)[:, :, 2] + _PRESSURE * cofactor[:, :, 2]
+        traction = nominal_stress(at)[:, :, 2] + _PRESSURE * cofactor[:, :, 2]
         for node, value in enumerate(values):
             np.add.at(load, nodes[:, node], value * weight * twice_area[:, None] * traction)
-    loads = np.append(_tension(mesh.points), _PRESSURE)
-    displacement = _exact(space.points)
+    loads = np.append(exact_tension(mesh.points), _PRESSURE)
+    displacement = exact(space.points)
     displacement[solid.free] *= 0.8
     for _ in range(20):
         residual = solid.residual(displacement, loads) - load[solid.free]
@@ -208,7 +164,7 @@ def _l2_error(order: int, cells: int, box, along, solid_of) -> float:
     square = 0.0
     for weight, vertices, values in zip(6.0 * _WEIGHTS, _BARYCENTRIC, shape, strict=True):
         at = np.einsum("a,eai->ei", vertices, mesh.points[mesh.cells])
-        off = np.einsum("a,eai->ei", values, displacement[space.nodes]) - _exact(at)
+        off = np.einsum("a,eai->ei", values, displacement[space.nodes]) - exact(at)
         square += weight * mesh.volumes @ np.sum(off**2, axis=1)
     return float(np.sqrt(square))
 

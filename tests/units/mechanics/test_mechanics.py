@@ -7,7 +7,6 @@ from cardiac_cosim.units.fiber_generator import FiberGenerator
 from cardiac_cosim.units.mechanics import Mechanics
 from cardiac_cosim.units.mechanics.bulk import Tissue
 from cardiac_cosim.units.mechanics.elements.linear import linear
-from cardiac_cosim.units.mechanics.kinematics import Kinematics
 from cardiac_cosim.units.mechanics.laws.holzapfel_fiber import HolzapfelFiber
 from cardiac_cosim.units.mechanics.laws.neo_hooke import NeoHooke
 from cardiac_cosim.units.mechanics.loads.active_stress import ActiveShares
@@ -17,6 +16,7 @@ from cardiac_cosim.units.mechanics.solvers.equilibrium import Convergence, Equil
 from cardiac_cosim.units.mechanics.solvers.factored import Factored, Factors, NotConverged
 from cardiac_cosim.units.mechanics.solvers.newton import Newton
 from cardiac_cosim.units.mesh import Mesh
+from manufactured import FIBER, SHEET, body_force, exact, exact_tension
 from scipy.optimize import fsolve
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
@@ -242,76 +242,24 @@ def test_free_cube_contracts_to_the_closed_form(tension: float, box, along) -> N
 
 # --- convergence under refinement ----------------------------------------------------------------------------------
 
-_AMPLITUDE = np.array([0.06, -0.05, 0.04])
-_ACROSS_TENSION = 0.2
-
-
-def _manufactured(points: np.ndarray) -> np.ndarray:
-    x, y, z = points.T
-    wave = np.sin(np.pi * x) * np.cos(2.0 * y) * np.exp(0.5 * z) + x * y
-    return wave[:, None] * _AMPLITUDE
-
-
-def _manufactured_gradient(points: np.ndarray) -> np.ndarray:
-    x, y, z = points.T
-    grow = np.exp(0.5 * z)
-    slope = np.stack(
-        [
-            np.pi * np.cos(np.pi * x) * np.cos(2.0 * y) * grow + y,
-            -2.0 * np.sin(np.pi * x) * np.sin(2.0 * y) * grow + x,
-            0.5 * np.sin(np.pi * x) * np.cos(2.0 * y) * grow,
-        ],
-        axis=1,
-    )
-    return np.eye(3) + _AMPLITUDE[None, :, None] * slope[:, None, :]
-
-
-def _manufactured_tension(points: np.ndarray) -> np.ndarray:
-    return _ACROSS_TENSION * (1.0 + points[:, 0] - 0.5 * points[:, 2])
-
-
-def _nominal_stress(points: np.ndarray, structure: np.ndarray, active: np.ndarray) -> np.ndarray:
-    gradient = _manufactured_gradient(points)
-    cauchy_green = gradient.transpose(0, 2, 1) @ gradient
-    at = Kinematics(
-        cauchy_green,
-        np.linalg.inv(cauchy_green),
-        np.log(np.linalg.det(gradient)),
-        np.broadcast_to(structure, gradient.shape),
-        np.broadcast_to(np.diag([0.0, 0.0, 1.0]), gradient.shape),
-    )
-    stress = sum(law.stress(at) for law in _LAWS) + _manufactured_tension(points)[:, None, None] * active
-    return gradient @ stress
-
-
-def _body_force(points: np.ndarray, structure: np.ndarray, active: np.ndarray) -> np.ndarray:
-    """−Div P by central differences of fourth order, which leave errors of 1e-10."""
-    force, step = np.zeros_like(points), 2e-3
-    for axis in range(3):
-        for shift, weight in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
-            moved = points + shift * step * np.eye(3)[axis]
-            force -= weight / (12.0 * step) * _nominal_stress(moved, structure, active)[:, :, axis]
-    return force
-
 
 def _l2_error(cells: int, box, along) -> float:
     """Distance in L2 of the discrete solution from the manufactured one, all surface nodes prescribed."""
     axis = np.linspace(0.0, 1.0, cells + 1)
     mesh = box(axis, axis, axis)
-    fiber, sheet = along(mesh, (0.6, 0.8, 0.0)), along(mesh, (0.0, 0.0, 1.0))
+    fiber, sheet = along(mesh, FIBER), along(mesh, SHEET)
     surface = np.unique(mesh.surface)
     solid = _solid(mesh, fiber, sheet, surface)
-    structure, active = np.outer(fiber[0], fiber[0]), ActiveShares().tensor(fiber[:1], sheet[:1])[0]
     # Four-point rule of degree 2, shape functions at its points.
     shape = np.full((4, 4), 0.1381966011250105) + 0.4472135954999579 * np.eye(4)
     load = np.zeros((mesh.nodes, 3))
     for weights in shape:
         at = np.einsum("a,eai->ei", weights, mesh.points[mesh.cells])
-        density = 0.25 * mesh.volumes[:, None] * _body_force(at, structure, active)
+        density = 0.25 * mesh.volumes[:, None] * body_force(at)
         for node in range(4):
             np.add.at(load, mesh.cells[:, node], weights[node] * density)
-    tension = _manufactured_tension(mesh.points)
-    displacement = _manufactured(mesh.points)
+    tension = exact_tension(mesh.points)
+    displacement = exact(mesh.points)
     displacement[np.setdiff1d(np.arange(mesh.nodes), surface)] *= 0.8
     for _ in range(20):
         residual = solid.residual(displacement, tension) - load[solid.free]
@@ -322,7 +270,7 @@ def _l2_error(cells: int, box, along) -> float:
     square = 0.0
     for weights in shape:
         at = np.einsum("a,eai->ei", weights, mesh.points[mesh.cells])
-        off = np.einsum("a,eai->ei", weights, displacement[mesh.cells]) - _manufactured(at)
+        off = np.einsum("a,eai->ei", weights, displacement[mesh.cells]) - exact(at)
         square += 0.25 * mesh.volumes @ np.sum(off**2, axis=1)
     return float(np.sqrt(square))
 
