@@ -19,7 +19,7 @@ _STOP_MS = 320.0
 
 def _built(scenario: Path, folder: Path) -> list[Path]:
     """The FMUs that the command builds, in the scenario's order."""
-    command = [sys.executable, "-m", "cardiac_cosim.orchestrator.cli", "build", str(scenario), "--output", str(folder)]
+    command = [sys.executable, "-m", "cardiac_cosim.cli", "build", str(scenario), "--output", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
     return [Path(line) for line in done.stdout.splitlines()]
 

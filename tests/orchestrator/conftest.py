@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cardiac_cosim.orchestrator.cli import main
+from cardiac_cosim.cli.app import main
 from cardiac_cosim.orchestrator.coupling.connections import connect
 from cardiac_cosim.orchestrator.coupling.master import Master
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES

@@ -22,7 +22,7 @@ from fallbacks import without_fallbacks
 
 Cosim = Callable[..., Any]
 
-_COMMAND = [sys.executable, "-m", "cardiac_cosim.orchestrator.cli"]
+_COMMAND = [sys.executable, "-m", "cardiac_cosim.cli"]
 
 
 def _wrong(ended: Any, *words: str) -> None:

@@ -96,7 +96,7 @@ def test_a_run_that_fails_leaves_no_process_that_waits_to_draw(small_scenario: P
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_whatever_ends_a_run_ends_the_process_that_draws(number: int, small_scenario: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "cardiac_cosim.orchestrator.cli", "run", str(small_scenario), "--output", str(out)]
+    command = [sys.executable, "-m", "cardiac_cosim.cli", "run", str(small_scenario), "--output", str(out)]
     process = subprocess.Popen(
         [*command, "--set", "run.stop_ms=1000"],
         stderr=subprocess.PIPE,

@@ -11,8 +11,8 @@ from cardiac_cosim.orchestrator.results.figures.fiber_layout import fiber_lines,
 from cardiac_cosim.orchestrator.results.figures.heart_potential import chosen_frames
 from cardiac_cosim.orchestrator.results.figures.pressure_volume import pressure_volume
 from cardiac_cosim.orchestrator.results.figures.scene import View, shaded, strokes
-from cardiac_cosim.orchestrator.results.figures.stored_run import StoredRun
 from cardiac_cosim.orchestrator.results.figures.surface import normals, section, sharp_edges, smoothing, surface
+from cardiac_cosim.orchestrator.results.stored_run import StoredRun
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 

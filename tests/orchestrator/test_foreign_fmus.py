@@ -261,7 +261,7 @@ def test_a_run_that_an_fmu_ends_does_not_pass_for_done(
 ) -> None:
     text = _SCENARIO.replace("FIRST", str(bodies[quirk])).replace("SECOND", str(bodies["whole"]))
     (tmp_path / "oscillator.yaml").write_text(text)
-    command = [sys.executable, "-m", "cardiac_cosim.orchestrator.cli", "run", str(tmp_path / "oscillator.yaml")]
+    command = [sys.executable, "-m", "cardiac_cosim.cli", "run", str(tmp_path / "oscillator.yaml")]
     ended = subprocess.run(
         [*command, "--output", str(tmp_path / "out"), "--no-figures"], capture_output=True, text=True, timeout=60
     )

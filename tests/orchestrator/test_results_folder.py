@@ -39,7 +39,7 @@ from fallbacks import without_fallbacks
 Cosim = Callable[..., Any]
 
 _SETS = ("run.stop_ms=8", "output.every_ms=2", "run.checkpoint_every=3")
-_COMMAND = [sys.executable, "-m", "cardiac_cosim.orchestrator.cli"]
+_COMMAND = [sys.executable, "-m", "cardiac_cosim.cli"]
 _FILES = {"coupling.csv", "fields.h5", "fields.xdmf", "profile.json", "summary.json", "timeseries.csv"}
 
 

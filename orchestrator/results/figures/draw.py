@@ -7,12 +7,12 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ..stored_run import StoredRun
 from ..whole import write_whole
 from .fiber_layout import fiber_layout
 from .heart_potential import heart_potential
 from .lines import cavity_volumes, probe_potential
 from .pressure_volume import pressure_volume
-from .stored_run import StoredRun
 
 #: Each figure by its file name; one that finds no data in the run returns None.
 FIGURES: dict[str, Callable[[StoredRun], Figure | None]] = {

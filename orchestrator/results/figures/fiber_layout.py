@@ -10,8 +10,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from scipy.spatial import cKDTree
 
 from ...participants.participant import Values
+from ..stored_run import Body, StoredRun
 from .scene import Painted, View, add_scale_bar, pen, shaded, show, strokes
-from .stored_run import Body, StoredRun
 from .surface import Numbers, normals, section, sharp_edges, smoothing, surface
 
 # Least distance, length and width of the fibre lines relative to the size of the body.

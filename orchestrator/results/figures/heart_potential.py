@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from ...participants.participant import Values
+from ..stored_run import StoredRun
 from .scene import Painted, View, add_scale_bar, pen, shaded, show
-from .stored_run import StoredRun
 from .surface import normals, sharp_edges, smoothing, surface
 
 #: Times of interest of a heartbeat; the nearest stored frames are drawn.

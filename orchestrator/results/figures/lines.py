@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...participants.participant import Values
-from .stored_run import StoredRun
+from ..stored_run import StoredRun
 
 # Colours that people with any colour vision tell apart (Okabe and Ito), the darker ones first.
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from .stored_run import StoredRun
+from ..stored_run import StoredRun
 
 _VOLUME, _PRESSURE = "_volume_ml", "_pressure_kPa"
 _COLORS = ("#0072B2", "#D55E00")

@@ -1,41 +1,18 @@
-"""The command `cosim`."""
+"""`cosim run`, `cosim build` and `cosim show`."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
-from .errors import InputError, Interrupted, RunError
-from .scenario import Scenario, load_scenario
-from .supervision import watch
-
-#: Exit codes; 1 is left for what should not happen, an exception nobody expected.
-INPUT_WRONG = 2
-RUN_FAILED = 3
-#: Added to the number of the signal that stopped a run, as shells do: 130 after Ctrl-C.
-INTERRUPTED = 128
-
-app = typer.Typer(
-    help="A beating two-chamber heart as FMI co-simulation of exchangeable physics units.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-
-ScenarioFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file, or a system package (.ssp).")
-]
-Assignments = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a key of the scenario; may be repeated."),
-]
+from ..orchestrator.errors import InputError, Interrupted
+from ..orchestrator.scenario import Scenario
+from .exit_codes import INTERRUPTED
+from .scenario_file import Assignments, ScenarioFile, about, opened
 
 
-@app.command()
 def run(
     file: ScenarioFile,
     output: Annotated[Path | None, typer.Option(help="Results folder; default results/<name>.")] = None,
@@ -52,13 +29,13 @@ def run(
 ) -> None:
     """Run a scenario and write time series, fields, coupling log, summary and figures."""
     # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
-    from .run import run_scenario
+    from ..orchestrator.run import run_scenario
 
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
-    with _opened(file, overrides) as (scenario, base):
+    with opened(file, overrides) as (scenario, base):
         folder = output if output is not None else Path("results") / scenario.name
         console = Console(stderr=True)
-        with _about(file):
+        with about(file):
             try:
                 outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume, figures)
             except Interrupted as error:
@@ -72,7 +49,6 @@ def run(
     _report(scenario, outcome.folder, outcome.summary)
 
 
-@app.command()
 def build(
     file: ScenarioFile,
     output: Annotated[Path, typer.Option(help="Where the FMUs go.")] = Path("fmus-built"),
@@ -87,10 +63,10 @@ def build(
     ] = 2,
 ) -> None:
     """Build the FMU of every unit in a scenario: one <unit name>.fmu each, on the scenario's mesh."""
-    from .build import build_fmus, write_container_file, write_osp_files, write_package
-    from .scene_warnings import scene_warnings
+    from ..orchestrator.build import build_fmus, write_container_file, write_osp_files, write_package
+    from ..orchestrator.scene_warnings import scene_warnings
 
-    with _opened(file, assignments or []) as (scenario, base), _about(file):
+    with opened(file, assignments or []) as (scenario, base), about(file):
         if fmi == 3 and (ssp or osp or container):
             raise InputError("--ssp, --osp and --container are for FMUs of FMI 2.0; leave --fmi 3 out")
         built = build_fmus(scenario, base, output, may_be_none=ssp or osp or container, fmi=fmi)
@@ -107,35 +83,12 @@ def build(
             typer.echo(f"{path}\nnow: fmucontainer -fmu-directory {output} -container {path.name}")
 
 
-@app.command()
 def show(file: ScenarioFile, assignments: Assignments = None) -> None:
-    """Say what a scenario builds, exchanges and solves, and what it does without; nothing is run."""
-    from .run import show_scenario
+    """Show what a scenario would build, exchange, solve and omit, without running it."""
+    from ..orchestrator.run import show_scenario
 
-    with _opened(file, assignments or []) as (scenario, base), _about(file):
+    with opened(file, assignments or []) as (scenario, base), about(file):
         typer.echo(show_scenario(scenario, base))
-
-
-@contextmanager
-def _opened(file: Path, assignments: list[str]) -> Iterator[tuple[Scenario, Path]]:
-    """The scenario in `file`, and the folder that its paths are relative to."""
-    if file.suffix.lower() != ".ssp":
-        yield load_scenario(file, assignments), file.parent
-        return
-    # Imported here, so that scenarios do not wait for what reads packages.
-    from .ssp import open_package
-
-    with open_package(file, assignments, lambda text: typer.echo(f"note: {text}", err=True)) as opened:
-        yield opened
-
-
-@contextmanager
-def _about(file: Path) -> Iterator[None]:
-    """Put the scenario file in front of what is wrong with its content."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
 
 
 def _report(scenario: Scenario, folder: Path, summary: dict[str, Any]) -> None:
@@ -166,27 +119,3 @@ def _report(scenario: Scenario, folder: Path, summary: dict[str, Any]) -> None:
 
 def _warn(text: str) -> None:
     typer.echo(f"warning: {text}", err=True)
-
-
-def main() -> None:
-    """The command, in this process.
-
-    Exit code 0: done; 2: the input is wrong; 3: the run failed; 128 + signal: stopped; 1: a bug.
-    """
-    try:
-        app()
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(INPUT_WRONG)
-    except RunError as error:
-        print(f"failed: {error}", file=sys.stderr)
-        sys.exit(RUN_FAILED)
-
-
-def supervised_main() -> None:
-    """The same, watched by a process that knows if foreign code ended it (`supervision`)."""
-    watch(main)
-
-
-if __name__ == "__main__":
-    supervised_main()

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ...participants.participant import Values
+from ..participants.participant import Values
 
 
 @dataclass(frozen=True)

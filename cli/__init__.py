@@ -1,0 +1,1 @@
+"""The command `cosim`: the doors through which a person comes in; all work is done on the floors below."""

@@ -1,0 +1,39 @@
+"""The command, put together."""
+
+import sys
+
+import typer
+
+from ..orchestrator.errors import InputError, RunError
+from ..orchestrator.supervision import watch
+from . import scenario_commands
+from .exit_codes import INPUT_WRONG, RUN_FAILED
+
+app = typer.Typer(
+    help="A beating two-chamber heart as FMI co-simulation of exchangeable physics units.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in (scenario_commands.run, scenario_commands.build, scenario_commands.show):
+    app.command()(command)
+
+
+def main() -> None:
+    """The command, in this process.
+
+    Exit code 0: done; 2: the input is wrong; 3: the run failed; 128 + signal: stopped; 1: a bug.
+    """
+    try:
+        app()
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(INPUT_WRONG)
+    except RunError as error:
+        print(f"failed: {error}", file=sys.stderr)
+        sys.exit(RUN_FAILED)
+
+
+def supervised_main() -> None:
+    """The same, watched by a process that knows if foreign code ended it (`supervision`)."""
+    watch(main)

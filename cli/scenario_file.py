@@ -1,0 +1,41 @@
+"""The file that a command is about: opened, and in front of whatever is wrong with its content."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..orchestrator.errors import InputError
+from ..orchestrator.scenario import Scenario, load_scenario
+
+ScenarioFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file, or a system package (.ssp).")
+]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a key of the scenario; may be repeated."),
+]
+
+
+@contextmanager
+def opened(file: Path, assignments: list[str]) -> Iterator[tuple[Scenario, Path]]:
+    """The scenario in `file`, and the folder that its paths are relative to."""
+    if file.suffix.lower() != ".ssp":
+        yield load_scenario(file, assignments), file.parent
+        return
+    # Imported here, so that scenarios do not wait for what reads packages.
+    from ..orchestrator.ssp import open_package
+
+    with open_package(file, assignments, lambda text: typer.echo(f"note: {text}", err=True)) as package:
+        yield package
+
+
+@contextmanager
+def about(file: Path) -> Iterator[None]:
+    """Put the scenario file in front of what is wrong with its content."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
