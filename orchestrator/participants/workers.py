@@ -4,8 +4,6 @@ A process costs about a millisecond per call, and its death takes nobody else al
 to be installed in the same version; FMUs are sent there.
 """
 
-import os
-import signal
 from contextlib import suppress
 from itertools import cycle
 from pathlib import Path
@@ -13,10 +11,10 @@ from time import perf_counter
 from types import TracebackType
 from typing import Any
 
-from distributed import Client, LocalCluster
 from distributed.actor import ActorFuture
 from threadpoolctl import threadpool_limits
 
+from ..cluster import Cluster
 from ..errors import InputError, ParticipantError, ParticipantLost
 from .participant import Abilities, Implementation, Participant, Ports, Ramp, Values, Wait
 from .recipe import Recipe
@@ -24,42 +22,21 @@ from .recipe import Recipe
 #: How long to wait for a scheduler, or for an actor to be set up, in seconds.
 _PATIENCE_S = 300.0
 
-#: How long Dask may take to close, in seconds.
-_CLOSING_S = 5.0
-
 
 class Workers:
     """Where actors are made, one worker for each of `count`; `where` is `threads`, `processes` or an address."""
 
     def __init__(self, where: str, count: int, limit_s: float | None) -> None:
-        self._where = where
         self._limit_s = limit_s
-        self._cluster: LocalCluster | None = None
-        try:
-            if where in ("threads", "processes"):
-                self._cluster = LocalCluster(
-                    n_workers=count,
-                    threads_per_worker=1,
-                    processes=where == "processes",
-                    dashboard_address="127.0.0.1:0",
-                    silence_logs=40,
-                    memory_limit=0,
-                )
-            self._client = Client(self._cluster or where, timeout=10.0)
-            workers = sorted(self._client.scheduler_info(n_workers=-1)["workers"])
-        except OSError as error:
-            raise InputError(f"run.workers: no Dask scheduler answers at {where} ({error})") from None
-        if not workers:
-            self._client.close()
-            raise InputError(f"run.workers: the scheduler at {where} has no workers; start some: dask worker {where}")
+        self._cluster = Cluster(where, count, "run.workers")
         # Units share workers only where there are fewer workers than units.
-        self._next = cycle(workers)
+        self._next = cycle(self._cluster.workers)
 
     def make(self, recipe: Recipe) -> Participant:
         """The participant of `recipe`, in the next worker."""
-        sent = recipe if self._cluster is not None else recipe.portable()
+        sent = recipe if self._cluster.is_ours else recipe.portable()
         address = next(self._next)
-        future = self._client.submit(_Host, sent, actor=True, workers=[address], pure=False)
+        future = self._cluster.client.submit(_Host, sent, actor=True, workers=[address], pure=False)
         try:
             actor = future.result(timeout=_PATIENCE_S)
         except InputError:
@@ -74,18 +51,7 @@ class Workers:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._cluster is not None and self._where == "processes":
-            # Dask would wait for a unit that hangs. Nothing is lost: whoever leaves here has closed the participants.
-            for nanny in self._cluster.workers.values():
-                nanny.auto_restart = False
-                with suppress(ProcessLookupError, TypeError):
-                    os.kill(nanny.pid, signal.SIGKILL)
-        # A scheduler that does not come to an end in time, on a busy machine, is not to hide how the run ended.
-        with suppress(TimeoutError, OSError):
-            self._client.close(timeout=_CLOSING_S)
-        if self._cluster is not None:
-            with suppress(TimeoutError, OSError):
-                self._cluster.close(timeout=_CLOSING_S)
+        self._cluster.__exit__(kind, error, trace)
 
 
 class _Host:

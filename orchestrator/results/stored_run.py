@@ -1,15 +1,21 @@
-"""Read back what a run left in its results folder: fields.h5 and timeseries.csv."""
+"""Read back what a run left in its results folder: the one reader for figures, studies, benchmarks and notebooks."""
 
 import csv
+import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from ..participants.participant import Values
+from .names import COUPLING, FIELDS, SUMMARY, TIME_SERIES
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True)
@@ -54,12 +60,33 @@ class StoredRun:
     frames_ms:
         Times of the stored frames, shape (frames,).
     columns:
-        The time series by column name, each of shape (rows,); an empty cell is NaN.
+        The numbers of the time series by column name, each of shape (rows,); an empty cell is NaN.
+    steps:
+        The numbers of the coupling log in the same way, a row per accepted step.
+    summary:
+        The content of summary.json.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._fields = folder / "fields.h5"
-        self._series = folder / "timeseries.csv"
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        self._fields = self.folder / FIELDS
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """See the class."""
+        try:
+            content = json.loads((self.folder / SUMMARY).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+    def time_series(self) -> "pandas.DataFrame":
+        """The time series as a data frame, texts included, indexed by `time_ms`; empty where there is none."""
+        return _frame(self.folder / TIME_SERIES)
+
+    def coupling(self) -> "pandas.DataFrame":
+        """The coupling log as a data frame, a row per accepted step, indexed by `time_ms`; empty if there is none."""
+        return _frame(self.folder / COUPLING)
 
     @cached_property
     def mesh(self) -> Body | None:
@@ -79,14 +106,25 @@ class StoredRun:
     @cached_property
     def columns(self) -> dict[str, Values]:
         """See the class."""
-        if not self._series.exists():
-            return {}
-        with self._series.open(newline="", encoding="utf-8") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-        # A run that was killed may leave half a row at the end.
-        complete = [[float(cell) if cell else np.nan for cell in row] for row in rows if len(row) == len(header)]
-        table = np.array(complete).reshape(len(complete), len(header))
-        return {name: table[:, place] for place, name in enumerate(header)}
+        return _numbers(self.folder / TIME_SERIES)
+
+    @cached_property
+    def steps(self) -> dict[str, Values]:
+        """See the class."""
+        return _numbers(self.folder / COUPLING)
+
+    @cached_property
+    def points_mm(self) -> Values | None:
+        """The undeformed nodes of any scene, shape (nodes, 3)."""
+        return self._read("points_mm")
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """The names of the fields that have frames, with their units of measure."""
+        if not self._fields.exists():
+            return ()
+        with h5py.File(self._fields, "r") as file:
+            return tuple(file["frames"]) if "frames" in file else ()
 
     @property
     def end_ms(self) -> float:
@@ -116,3 +154,29 @@ class StoredRun:
                 return None
             values = within[found[0]]
             return np.asarray(values[:] if row is None else values[row])
+
+
+def _numbers(path: Path) -> dict[str, Values]:
+    """The columns of numbers of a CSV file by name; columns that hold texts are left out."""
+    if not path.exists():
+        return {}
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file)) or [[]]
+    # A run that was killed may leave half a row at the end.
+    complete = [row for row in rows if len(row) == len(header)]
+    found = {}
+    for place, name in enumerate(header):
+        try:
+            found[name] = np.array([float(row[place]) if row[place] else np.nan for row in complete])
+        except ValueError:
+            continue
+    return found
+
+
+def _frame(path: Path) -> "pandas.DataFrame":
+    # Imported here: who draws or compares need not wait for it.
+    import pandas
+
+    if not path.exists():
+        return pandas.DataFrame()
+    return pandas.read_csv(path, index_col="time_ms")

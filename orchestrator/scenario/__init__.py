@@ -1,15 +1,30 @@
 """A scenario: what a person asks for in a YAML file, validated whole before anything runs."""
 
-from .file import checked, load_scenario
+from .file import (
+    Contradiction,
+    checked,
+    file_content,
+    load_scenario,
+    parsed_assignment,
+    scenario_content,
+    validated,
+    with_settings,
+)
 from .model import ConnectionEntry, Coupling, Iterate, Scenario, Scene, UnitEntry
 
 __all__ = [
     "ConnectionEntry",
+    "Contradiction",
     "Coupling",
     "Iterate",
     "Scenario",
     "Scene",
     "UnitEntry",
     "checked",
+    "file_content",
     "load_scenario",
+    "parsed_assignment",
+    "scenario_content",
+    "validated",
+    "with_settings",
 ]

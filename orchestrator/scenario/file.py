@@ -1,10 +1,10 @@
 """Scenarios from files and from the command line."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
 from ..quoting import quoted, shortened
@@ -18,67 +18,114 @@ _MOST_PROBLEMS, _LONGEST_ORIGIN = 20, 300
 #: Sections in sections that `--set` can name.
 _DEEPEST_KEY = 20
 
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+class Contradiction(InputError):
+    """Keys that are valid each by itself and cannot stand together: a step that does not divide the run."""
+
 
 def load_scenario(path: Path, assignments: Sequence[str] = ()) -> Scenario:
     """Read `path` and apply `assignments` (each `key.path=value`); InputError names the key and the remedy."""
-    content = _read(path)
+    return checked(scenario_content(path), path, assignments)
+
+
+def scenario_content(path: Path) -> dict[str, Any]:
+    """The sections of a scenario file, not validated yet; InputError if it is no file of sections."""
+    return file_content(path, "scenario", "`name`, `scene` and `units`", Scenario)
+
+
+def file_content(path: Path, kind: str, needs: str, model: type[BaseModel]) -> dict[str, Any]:
+    """The sections of a file of the `kind` that `model` describes, not validated yet; InputError if it has none.
+
+    `needs` are the keys that it has at least, as they are told of an empty file.
+    """
+    content = _read(path, kind)
     if content is None:
-        raise InputError(f"{path}: the file is empty; a scenario needs at least `name`, `scene` and `units`")
+        raise InputError(f"{path}: the file is empty; a {kind} needs at least {needs}")
     if not isinstance(content, dict):
-        raise InputError(f"{path}: a scenario is lines `key: value` with the keys {', '.join(Scenario.model_fields)}")
-    return checked(content, path, assignments)
+        raise InputError(f"{path}: a {kind} is lines `key: value` with the keys {', '.join(model.model_fields)}")
+    return content
 
 
 def checked(content: dict[str, Any], path: Path, assignments: Sequence[str] = ()) -> Scenario:
     """The scenario of a file's `content`, changed by `assignments`; InputError begins with the file's `path`."""
+    origin = str(path)
+    if assignments:
+        origin += " with " + shortened(", ".join(f"--set {text}" for text in assignments), _LONGEST_ORIGIN)
     for assignment in assignments:
         _assign(content, assignment)
+    return validated(content, Scenario, origin)
+
+
+def with_settings(content: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of a scenario's `content` with the values of `settings` at their keys (`coupling.step_ms`)."""
+    changed = dict(content)
+    for key, value in settings.items():
+        parts = key.split(".")
+        if not all(parts) or len(parts) > _DEEPEST_KEY + 1 or not key.isprintable():
+            raise InputError(f"{quoted(key)}: write a key of a scenario as coupling.step_ms")
+        _place(changed, parts, value, quoted(key), "")
+    return changed
+
+
+def parsed_assignment(assignment: str) -> tuple[str, Any]:
+    """The key and the value of `key.path=value`; InputError if it is none."""
+    key, separator, text = assignment.partition("=")
+    parts = [part.strip() for part in key.split(".")]
+    told = shortened(assignment, _LONGEST_ORIGIN)
+    if not separator or not all(parts) or len(parts) > _DEEPEST_KEY + 1 or not key.isprintable():
+        raise InputError(f"--set {told}: write it as key.path=value, e.g. --set run.stop_ms=100")
     try:
-        return Scenario.model_validate(content)
+        return ".".join(parts), parse_yaml(text)
+    except ValueError as error:
+        raise InputError(f"--set {told}: the value is {error}") from None
+
+
+def validated(content: Mapping[str, Any], model: type[_Model], origin: str) -> _Model:
+    """The `model` of `content`; InputError begins with `origin`, and is a Contradiction where no key is wrong alone."""
+    try:
+        return model.model_validate(content)
     except ValidationError as error:
-        problems = list(dict.fromkeys(explained(problem) for problem in error.errors()))
-        if len(problems) > _MOST_PROBLEMS:
-            problems[_MOST_PROBLEMS:] = [f"and {len(problems) - _MOST_PROBLEMS} more problems"]
-        origin = str(path)
-        if assignments:
-            origin += " with " + shortened(", ".join(f"--set {text}" for text in assignments), _LONGEST_ORIGIN)
-        raise InputError(f"{origin}: " + f"\n{origin}: ".join(problems)) from None
+        errors = error.errors()
+    problems = list(dict.fromkeys(explained(problem, model) for problem in errors))
+    if len(problems) > _MOST_PROBLEMS:
+        problems[_MOST_PROBLEMS:] = [f"and {len(problems) - _MOST_PROBLEMS} more problems"]
+    together = all(problem["type"] == "value_error" and isinstance(problem["input"], Mapping) for problem in errors)
+    raise (Contradiction if together else InputError)(f"{origin}: " + f"\n{origin}: ".join(problems))
 
 
-def _read(path: Path) -> Any:
+def _read(path: Path, kind: str) -> Any:
     try:
         with path.open("rb") as file:
             return parse_yaml(file.read(LARGEST_TEXT + 1))
     except FileNotFoundError:
-        raise InputError(f"{path}: no such scenario file") from None
+        raise InputError(f"{path}: no such {kind} file") from None
     except IsADirectoryError:
-        raise InputError(f"{path}: this is a folder; give the scenario's YAML file") from None
+        raise InputError(f"{path}: this is a folder; give the {kind}'s YAML file") from None
     except OSError as error:
-        raise InputError(f"{path}: the scenario file cannot be read ({error.strerror})") from None
+        raise InputError(f"{path}: the {kind} file cannot be read ({error.strerror})") from None
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
 
 
 def _assign(content: dict[str, Any], assignment: str) -> None:
-    key, separator, text = assignment.partition("=")
-    *parents, last = [part.strip() for part in key.split(".")]
-    told = shortened(assignment, _LONGEST_ORIGIN)
-    if not separator or not all((*parents, last)) or len(parents) > _DEEPEST_KEY or not key.isprintable():
-        raise InputError(f"--set {told}: write it as key.path=value, e.g. --set run.stop_ms=100")
-    try:
-        value = parse_yaml(text)
-    except ValueError as error:
-        raise InputError(f"--set {told}: the value is {error}") from None
+    key, value = parsed_assignment(assignment)
+    _place(content, key.split("."), value, f"--set {shortened(assignment, _LONGEST_ORIGIN)}", "--set ")
+
+
+def _place(content: dict[str, Any], parts: Sequence[str], value: Any, told: str, option: str) -> None:
+    """Put `value` in its place; sections on the way there are copied, for in YAML two can be one, by an alias."""
+    *parents, last = parts
     target = content
     for number, parent in enumerate(parents):
         section = target.get(parent)
         if not isinstance(section, dict | None):
             whole = shortened(".".join(parents[: number + 1]))
             raise InputError(
-                f"--set {told}: '{shortened(parent)}' holds {quoted(section)}, not a section; set it as a whole, "
-                f"--set {whole}=..."
+                f"{told}: '{shortened(parent)}' holds {quoted(section)}, not a section; set it as a whole, "
+                f"{option}{whole}=..."
             )
-        # A copy: in YAML two sections can be one and the same, by an alias.
         target[parent] = dict(section or {})
         target = target[parent]
     target[last] = value

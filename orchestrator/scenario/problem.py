@@ -1,31 +1,13 @@
 """What is wrong with a scenario's content, as a sentence for a person: the key, what was written, and the remedy."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel
 
 from ..errors import did_you_mean
 from ..quoting import quoted, shortened
-from .model import (
-    AS_ENTRY,
-    AS_TEXT,
-    NAME,
-    PROBE_NAME,
-    UNIT_NAME,
-    WORKERS,
-    Adaptive,
-    ConnectionEntry,
-    Coupling,
-    CriterionEntry,
-    Inputs,
-    Iterate,
-    Output,
-    Run,
-    Scenario,
-    Scene,
-    UnitEntry,
-)
+from .model import AS_ENTRY, AS_TEXT, NAME, PROBE_NAME, UNIT_NAME, WORKERS
 
 _ALLOWED = {
     WORKERS: "choose threads, processes, or the address of a Dask scheduler, tcp://host:port",
@@ -35,14 +17,14 @@ _ALLOWED = {
 }
 
 
-def explained(problem: Mapping[str, Any]) -> str:
-    """The sentence for one of pydantic's errors."""
+def explained(problem: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """The sentence for one of pydantic's errors about the content of `model`."""
     location = [shortened(str(part)) for part in problem["loc"] if part not in ("[key]", AS_TEXT, AS_ENTRY)]
     kind, given = problem["type"], problem["input"]
     key, is_key = ".".join(location), "[key]" in problem["loc"]
     context = problem.get("ctx", {})
     if kind == "extra_forbidden":
-        return f"unknown key '{key}'{did_you_mean(location[-1], _keys_at(location[:-1]))}"
+        return f"unknown key '{key}'{did_you_mean(location[-1], _keys_at(location[:-1], model))}"
     if kind == "missing":
         return f"the key '{key}' is missing"
     if kind == "value_error":
@@ -91,13 +73,19 @@ def _short(given: Any) -> str:
     return "empty" if given is None else quoted(given)
 
 
-def _keys_at(location: Sequence[str]) -> list[str]:
-    """The keys that the section at `location` may have."""
-    sections: dict[str, type[BaseModel]] = {"scene": Scene, "coupling": Coupling, "run": Run, "output": Output}
-    sections |= {"connections": ConnectionEntry, "inputs": Inputs}
-    section = UnitEntry if location[:1] == ["units"] else sections.get(location[0], Scenario) if location else Scenario
-    if location[:2] == ["coupling", "adaptive"]:
-        section = Adaptive
-    if location[:2] == ["coupling", "iterate"]:
-        section = CriterionEntry if location[2:3] == ["converge"] else Iterate
-    return [field.alias or name for name, field in section.model_fields.items()]
+def _keys_at(location: Sequence[str], model: type[BaseModel]) -> list[str]:
+    """The keys that the section at `location` of a `model` may have."""
+    section: Any = model
+    for part in location:
+        fields = {field.alias or name: field.annotation for name, field in _section(section).model_fields.items()}
+        # In a list of sections, or in one of sections by name, the part is which of them.
+        section = fields.get(part, section)
+    return [field.alias or name for name, field in _section(section).model_fields.items()]
+
+
+def _section(annotation: Any) -> type[BaseModel]:
+    """The section that a key of this annotation holds, however it is wrapped; the first of several."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (_section(argument) for argument in get_args(annotation))
+    return next((section for section in found if section is not BaseModel), BaseModel)

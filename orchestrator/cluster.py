@@ -1,0 +1,70 @@
+"""Processes or threads that work elsewhere, by Dask: a cluster of our own, or the workers of a scheduler."""
+
+import os
+import signal
+from contextlib import suppress
+from types import TracebackType
+
+import dask
+from distributed import Client, LocalCluster
+
+from .errors import InputError
+
+#: How long Dask may take to close, in seconds.
+_CLOSING_S = 5.0
+
+#: A worker that dies costs what it was doing, which is not tried again; one that works for long has not died.
+_SETTINGS = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-ttl": None}
+
+
+class Cluster:
+    """`count` workers of one thread each in `threads` or `processes`, or those of the scheduler at an address `where`.
+
+    InputError names `key`, which chose the place, if nobody answers there.
+    """
+
+    def __init__(self, where: str, count: int, key: str) -> None:
+        self._where = where
+        self._own: LocalCluster | None = None
+        try:
+            if self.is_ours:
+                with dask.config.set(_SETTINGS):
+                    self._own = LocalCluster(
+                        n_workers=count,
+                        threads_per_worker=1,
+                        processes=where == "processes",
+                        dashboard_address="127.0.0.1:0",
+                        silence_logs=50,
+                        memory_limit=0,
+                    )
+            self.client = Client(self._own or where, timeout=10.0)
+            self.workers = sorted(self.client.scheduler_info(n_workers=-1)["workers"])
+        except OSError as error:
+            raise InputError(f"{key}: no Dask scheduler answers at {where} ({error})") from None
+        if not self.workers:
+            self.client.close()
+            raise InputError(f"{key}: the scheduler at {where} has no workers; start some: dask worker {where}")
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether the workers are on this machine, and end with us."""
+        return self._where in ("threads", "processes")
+
+    def __enter__(self) -> "Cluster":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._own is not None and self._where == "processes":
+            # Dask would wait for work that hangs. Nothing is lost: whoever leaves here has what the workers did.
+            for nanny in self._own.workers.values():
+                nanny.auto_restart = False
+                with suppress(ProcessLookupError, TypeError):
+                    os.kill(nanny.pid, signal.SIGKILL)
+        # A scheduler that does not come to an end in time, on a busy machine, is not to hide how the work ended.
+        with suppress(TimeoutError, OSError):
+            self.client.close(timeout=_CLOSING_S)
+        if self._own is not None:
+            with suppress(TimeoutError, OSError):
+                self._own.close(timeout=_CLOSING_S)
