@@ -82,10 +82,7 @@ def called_directly(scenario: Scenario) -> Scenario:
 
 def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
     """The mesh of `scenario`, if it has one; InputError for a scene, unit or parameter that does not exist."""
-    for name, entry in scenario.units.items():
-        if entry.unit is not None:
-            with _naming(f"units.{name}"):
-                check_unit(entry.unit, entry.parameters)
+    check_units(scenario)
     if scenario.scene is None:
         return None
     with _naming("scene"):
@@ -93,6 +90,14 @@ def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
         units = [entry.unit for entry in scenario.units.values() if entry.unit is not None]
         check_mesh(mesh, scenario.scene, base, units)
     return mesh
+
+
+def check_units(scenario: Scenario) -> None:
+    """InputError for a unit or a parameter that does not exist, and for a parameter's value that is out of range."""
+    for name, entry in scenario.units.items():
+        if entry.unit is not None:
+            with _naming(f"units.{name}"):
+                check_unit(entry.unit, entry.parameters)
 
 
 def make_participants(

@@ -1,7 +1,7 @@
 """A whole run: scenario in, results folder out."""
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +14,7 @@ from .assembly import assemble, called_directly, checked_mesh
 from .coupling.master import Observer
 from .drawing import Drawing
 from .errors import InputError, Interrupted, RunError
+from .participants.native import Mesh
 from .progress import ProgressBar
 from .results import implementation
 from .results.folder import ResultsFolder
@@ -22,6 +23,9 @@ from .scenario import Scenario
 from .show import describe
 from .stopping import StopRequest
 from .wall_clock import WallClock
+
+#: From a scenario, and the folder that its paths are relative to, to its mesh, if it has one.
+MeshOf = Callable[[Scenario, Path], Mesh | None]
 
 
 @dataclass(frozen=True)
@@ -41,12 +45,13 @@ def run_scenario(
     fmu_dir: Path | None = None,
     resume: bool = False,
     figures: bool = False,
+    mesh_of: MeshOf = checked_mesh,
 ) -> Outcome:
     """Run `scenario`, whose paths are relative to `base`, and write the results to `output`.
 
     Progress goes to `console`; FMUs are taken from `fmu_dir`, or from the user's cache. With `resume` the run goes on
     from the last checkpoint in `output`, if there is one, and ends as if it had never stopped. `figures` are drawn
-    when it is done.
+    when it is done. `mesh_of` gives the scenario's mesh: whoever runs many scenarios on one mesh may have kept it.
 
     Raises
     ------
@@ -67,7 +72,7 @@ def run_scenario(
         drawing = stack.enter_context(Drawing(output)) if figures else None
         summary = folder.complete() if resume else None
         if summary is None:
-            summary = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing)
+            summary = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing, mesh_of)
         elif drawing is not None:
             drawing.begin()
         if drawing is None:
@@ -85,9 +90,10 @@ def _run(
     resume: bool,
     started: float,
     drawing: Drawing | None,
+    mesh_of: MeshOf,
 ) -> dict[str, Any]:
     before = folder.checkpoint() if resume else None
-    mesh = checked_mesh(scenario, base)
+    mesh = mesh_of(scenario, base)
     with ExitStack() as stack:
         stop = stack.enter_context(StopRequest())
         assembly = assemble(stack, scenario, base, mesh, fmu_dir)

@@ -54,7 +54,7 @@ class Origin:
         resolved = json.loads(json.dumps(scenario.resolved()))
         files = {name: _hash(base / name) for name in scenario.files()}
         versions = {"python": python_version(), **_versions()}
-        return cls(resolved, files, _program(), versions)
+        return cls(resolved, files, program(), versions)
 
     @classmethod
     def from_content(cls, content: Any) -> "Origin":
@@ -144,7 +144,8 @@ def _hash_all(files: Mapping[str, Path]) -> str:
 
 
 @cache
-def _program() -> str:
+def program() -> str:
+    """A hash of this program's code and kernels."""
     root = Path(__file__).parents[2]
     files = sorted(path for floor in _FLOORS for path in (root / floor).rglob("*") if path.suffix in _KINDS)
     return _hash_all({path.relative_to(root).as_posix(): path for path in files})

@@ -1,0 +1,181 @@
+"""Where the points of a study are run, each once, and their results are kept: `points/<hash>` in the study's folder."""
+
+import os
+import time
+from collections import deque
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+
+from distributed import FIRST_COMPLETED, Future, wait
+from distributed.scheduler import KilledWorker
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from ..orchestrator.cluster import Cluster
+from ..orchestrator.errors import InputError, Interrupted
+from ..orchestrator.results.lock import FolderLock
+from ..orchestrator.results.origin import program
+from ..orchestrator.stopping import StopRequest
+from .execution import Job, execute
+from .point import Point
+from .trial import CRASHED, Trial, read_trial
+
+_POINTS = "points"
+
+#: Seconds that the repetitions of short runs may take in all, and the part of all other runs by which they may exceed
+#: that: a study of many short points is to be done soon.
+_REPEATS_S, _REPEATS = 15.0, 0.1
+
+#: How often we look whether somebody wants us to stop, in seconds.
+_LOOK_S = 0.2
+
+
+class Bench:
+    """While entered, the folder is ours; InputError if another process has it.
+
+    Points are run one after the other, alone on their cores, in a process of their own; with `workers` so many at the
+    same time, or by the workers of the Dask scheduler at `scheduler`, who have to see the same files.
+    """
+
+    def __init__(
+        self, folder: Path, console: Console | None = None, workers: int | None = None, scheduler: str | None = None
+    ) -> None:
+        self.folder = folder
+        self._console = console or Console(quiet=True)
+        self._workers = workers
+        self._scheduler = scheduler
+        self._stack = ExitStack()
+        self._cluster: Cluster | None = None
+        self._repeats_s = _REPEATS_S
+        self._stop = StopRequest()
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether points have their cores to themselves, so that the wall clock tells what they cost."""
+        return self._scheduler is None and (self._workers or 1) == 1
+
+    def __enter__(self) -> "Bench":
+        self._stack.callback(FolderLock(self.folder).release)
+        self._stack.enter_context(self._stop)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def known(self, point: Point) -> Trial | None:
+        """How it went with a point, if it was run before."""
+        return read_trial(self._place(point))
+
+    def run(self, points: Iterable[Point], title: str) -> list[Trial]:
+        """Run whatever of `points` was not run before; how it went with each. `title` is for the progress bar.
+
+        Interrupted when a signal asked for it: what is finished by then stays.
+        """
+        wanted = list(points)
+        unique = {point.key: point for point in wanted}
+        trials = {key: trial for key, point in unique.items() if (trial := self.known(point)) is not None}
+        missing = [point for key, point in unique.items() if key not in trials]
+        if missing:
+            self._run(missing, len(unique), title, trials)
+        return [trials[point.key] for point in wanted]
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _place(self, point: Point) -> Path:
+        return (self.folder / _POINTS / point.key).absolute()
+
+    def _run(self, points: Sequence[Point], count: int, title: str, trials: dict[str, Trial]) -> None:
+        queue, running = deque(points), dict[Future, Point]()
+        bar = Progress(
+            TextColumn(f"[bold]{title}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[now]}"),
+            TimeElapsedColumn(),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
+        task = bar.add_task(title, total=count, completed=count - len(points), now="")
+        with bar:
+            cluster = self._started()
+            while queue or running:
+                while queue and len(running) < len(cluster.workers):
+                    point = queue.popleft()
+                    bar.update(task, now=str(point))
+                    running[cluster.client.submit(execute, self._job(point), pure=False)] = point
+                for future in _finished(running):
+                    point = running.pop(future)
+                    trials[point.key] = trial = self._outcome(future, point)
+                    self._account(trial)
+                    bar.advance(task)
+                if self._stop.signal is not None:
+                    raise Interrupted(self._stop.signal)
+
+    def _job(self, point: Point) -> Job:
+        return Job(point.scenario, point.base.absolute(), self._place(point), self._repeats_s, self.is_alone)
+
+    def _outcome(self, future: Future, point: Point) -> Trial:
+        try:
+            trial: Trial = future.result()
+        except KilledWorker:
+            return Trial(
+                self._place(point),
+                CRASHED,
+                "the process that ran it died, perhaps by foreign code; run that scenario by itself to learn more",
+            )
+        finally:
+            future.release()
+        return trial
+
+    def _account(self, trial: Trial) -> None:
+        walls = [cost.wall_s for cost in trial.costs]
+        self._repeats_s += _REPEATS * sum(walls[:1]) - sum(walls[1:])
+
+    def _started(self) -> Cluster:
+        if self._cluster is None:
+            if self._scheduler is None:
+                cluster = Cluster("processes", self._workers or 1, "--workers")
+            else:
+                cluster = Cluster(self._scheduler, 0, "--scheduler")
+            self._cluster = self._stack.enter_context(cluster)
+            if self._scheduler is not None:
+                self._check(cluster)
+        return self._cluster
+
+    def _check(self, cluster: Cluster) -> None:
+        """InputError unless all workers have this program and see this folder."""
+        mark = self.folder.absolute() / f".seen-by-{os.getpid()}-{time.monotonic_ns()}"
+        mark.touch()
+        try:
+            answers = cluster.client.run(_look, str(mark))
+        except ImportError as error:
+            raise InputError(f"--scheduler: the workers lack this project ({error}); install it there") from None
+        finally:
+            mark.unlink()
+        for worker, (known, sees) in answers.items():
+            if known != program():
+                raise InputError(
+                    f"--scheduler: worker {worker} has another version of this program; install the same one there"
+                )
+            if not sees:
+                raise InputError(
+                    f"--scheduler: worker {worker} does not see the folder {self.folder.absolute()}; choose an "
+                    "--output on a file system that all workers share"
+                )
+
+
+def _look(mark: str) -> tuple[str, bool]:
+    """On a worker: which program it has, and whether it sees a file of ours."""
+    return program(), Path(mark).exists()
+
+
+def _finished(running: Iterable[Future]) -> list[Future]:
+    futures = list(running)
+    try:
+        return list(wait(futures, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done)
+    except TimeoutError:
+        return []

@@ -1,0 +1,6 @@
+"""Speed against accuracy: what every point of a study costs, and by how much it differs from a reference."""
+
+from .charted import chart_study
+from .model import Chart, ChartLine, Row
+
+__all__ = ["Chart", "ChartLine", "Row", "chart_study"]

@@ -1,0 +1,97 @@
+"""A chart: lines of points, each with its errors, its cost and whether it lies on the front."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...orchestrator.results.comparison import Measure
+from ..trial import Trial
+
+#: What a point costs: seconds of the wall clock where it ran alone, else of the processor.
+WALL, CPU = "wall_s", "cpu_s"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A point: its varied `settings`, how it went, its errors by measure, and the measures on whose front it lies.
+
+    `errors` are infinite where only one of point and reference has the quantity, and lack what cannot be compared;
+    both have a `reason`. `trial` is None where the settings cannot stand together (`status` refused).
+    """
+
+    settings: Mapping[str, Any]
+    status: str
+    reason: str
+    trial: Trial | None
+    errors: Mapping[str, float] = field(default_factory=dict)
+    front: frozenset[str] = frozenset()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has results."""
+        return self.trial is not None and self.trial.is_done
+
+    @property
+    def solves(self) -> int:
+        """Steps of all units together."""
+        return 0 if self.trial is None else sum(self.trial.solves.values())
+
+    def cost(self, kind: str) -> float:
+        """Seconds of the `kind` WALL or CPU; of points that are done."""
+        if self.trial is None:
+            raise ValueError("a point that was refused has no cost")
+        return self.trial.wall_s if kind == WALL else self.trial.cpu_s
+
+
+@dataclass(frozen=True)
+class ChartLine:
+    """The points of a line in the order of the study, and the order of accuracy observed for each measure.
+
+    The order is that of the error in the one varied key that is a number (`refine`: in the mesh size that it halves);
+    measures for which it cannot be told are left out.
+    """
+
+    name: str
+    rows: Sequence[Row]
+    orders: Mapping[str, float]
+
+    @property
+    def varied(self) -> list[str]:
+        """The keys that change from point to point."""
+        return list(self.rows[0].settings) if self.rows else []
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A whole chart.
+
+    `cost` is what points are compared by, WALL or CPU. `uncertainty` of the reference is known by measure where there
+    are two. `references` say what the points are compared with; `notes` are sentences for a person.
+    """
+
+    name: str
+    title: str
+    cost: str
+    measures: Sequence[Measure]
+    lines: Sequence[ChartLine]
+    references: Sequence[str]
+    uncertainty: Mapping[str, float]
+    machine: Mapping[str, Any]
+    versions: Mapping[str, str]
+    notes: Sequence[str] = ()
+
+    @property
+    def rows(self) -> list[Row]:
+        """All points."""
+        return [row for line in self.lines for row in line.rows]
+
+    @property
+    def varied(self) -> list[str]:
+        """The keys that change within any of the lines."""
+        return list(dict.fromkeys(key for line in self.lines for key in line.varied))
+
+    @property
+    def units(self) -> list[str]:
+        """The units of all points that are done."""
+        trials = [row.trial for row in self.rows if row.trial is not None and row.is_done]
+        return list(dict.fromkeys(unit for trial in trials for unit in trial.solves))

@@ -1,0 +1,140 @@
+"""From a study to its points: every line's combinations of settings, checked before anything runs."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from ..orchestrator.assembly import check_units
+from ..orchestrator.errors import InputError
+from ..orchestrator.scenario import (
+    Contradiction,
+    Scenario,
+    file_content,
+    parsed_assignment,
+    scenario_content,
+    validated,
+    with_settings,
+)
+from .point import Point, told
+from .study import Line, Settings, Study
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A point of a line; `point` is None where its settings cannot stand together, and `reason` says why."""
+
+    settings: Mapping[str, Any]
+    point: Point | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What points are compared with: a point to be run, or results that are there."""
+
+    origin: str
+    point: Point | None = None
+    folder: Path | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study with its points by line, in the order of the file; `origin` is the study's file."""
+
+    study: Study
+    origin: str
+    references: Sequence[Reference]
+    lines: Mapping[str, Sequence[Planned]]
+
+    @property
+    def points(self) -> list[Point]:
+        """All that can be run."""
+        return [planned.point for line in self.lines.values() for planned in line if planned.point is not None]
+
+
+class Variants:
+    """A scenario file with other values at some keys; `origin` stands in front of what is wrong with them."""
+
+    def __init__(self, file: Path, common: Mapping[str, Any], origin: str) -> None:
+        self.file = file
+        self._content = scenario_content(file)
+        self._common = dict(common)
+        self._origin = origin
+
+    def scenario(self, settings: Mapping[str, Any], where: str = "") -> Scenario:
+        """The scenario with these settings on top of the common ones; `where` says where they stand in the study.
+
+        Raises
+        ------
+        Contradiction
+            Where each setting is valid by itself, and they cannot stand together.
+        InputError
+            For a key that there is not, and for a value that it cannot have.
+        """
+        both = self._common | dict(settings)
+        with_them = f" with {told(both)}" if both else ""
+        told_origin = f"{self._origin}: {where}: {self.file}{with_them}" if where else f"{self._origin}{with_them}"
+        try:
+            content = with_settings(self._content, both)
+        except InputError as error:
+            raise InputError(f"{told_origin}: {error}") from None
+        scenario = validated(content, Scenario, told_origin)
+        try:
+            check_units(scenario)
+        except InputError as error:
+            raise InputError(f"{told_origin}: {error}") from None
+        return scenario
+
+    def point(self, settings: Mapping[str, Any], where: str = "") -> Point:
+        """The same as a point."""
+        return Point(self.scenario(settings, where), self.file.parent, dict(settings))
+
+
+def load_study(path: Path) -> Study:
+    """The study in `path`; InputError names the file, the key and the remedy."""
+    content = file_content(path, "study", "`name`, `scenario`, `reference` and `lines`", Study)
+    return validated(content, Study, str(path))
+
+
+def plan_study(path: Path, assignments: Iterable[str] = ()) -> Plan:
+    """The points of the study in `path`, each with the `assignments` (`key.path=value`) too.
+
+    InputError for a key that the scenario does not have, a value that none can have, and a line without a valid point.
+    """
+    study = load_study(path)
+    common = study.set | dict(parsed_assignment(assignment) for assignment in assignments)
+    variants = Variants(path.parent / study.scenario, common, str(path))
+    references = [_reference(variants, path, settings) for settings in study.references]
+    lines = {line.name: _planned(variants, line, path) for line in study.lines}
+    return Plan(study, str(path), references, lines)
+
+
+def combinations(vary: Mapping[str, Sequence[Any]]) -> list[Settings]:
+    """Every combination of the values, the first key's changing most slowly."""
+    return [dict(zip(vary, values, strict=True)) for values in product(*vary.values())]
+
+
+def _reference(variants: Variants, path: Path, settings: Settings) -> Reference:
+    if "results" in settings:
+        folder = path.parent / settings["results"]
+        return Reference(f"reference: results: {folder}", folder=folder)
+    try:
+        return Reference(f"reference: {told(settings)}", variants.point(settings, "reference"))
+    except Contradiction as error:
+        raise InputError(str(error)) from None
+
+
+def _planned(variants: Variants, line: Line, path: Path) -> list[Planned]:
+    where = f"lines, '{line.name}'"
+    found = []
+    for settings in combinations(line.vary):
+        try:
+            point = variants.point(dict(line.set) | settings, where)
+            found.append(Planned(settings, Point(point.scenario, point.base, settings)))
+        except Contradiction as error:
+            found.append(Planned(settings, None, str(error).removeprefix(f"{path}: {where}: ")))
+    if all(planned.point is None for planned in found):
+        raise InputError(f"{path}: {where}: none of its points can be run, the first because of {found[0].reason}")
+    return found
