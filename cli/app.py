@@ -6,7 +6,7 @@ import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
-from . import scenario_commands
+from . import scenario_commands, study_commands
 from .exit_codes import INPUT_WRONG, RUN_FAILED
 
 app = typer.Typer(
@@ -15,7 +15,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (scenario_commands.run, scenario_commands.build, scenario_commands.show):
+for command in (scenario_commands.run, scenario_commands.build, scenario_commands.show, study_commands.chart):
     app.command()(command)
 
 

@@ -2,5 +2,6 @@
 
 from .charted import chart_study
 from .model import Chart, ChartLine, Row
+from .written import write_chart
 
-__all__ = ["Chart", "ChartLine", "Row", "chart_study"]
+__all__ = ["Chart", "ChartLine", "Row", "chart_study", "write_chart"]

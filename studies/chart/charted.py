@@ -42,7 +42,7 @@ def chart_study(plan: Plan, bench: Bench) -> Chart:
     versions = references[0].summary.get("versions", {})
     return Chart(
         plan.study.name,
-        f"{plan.study.name}: {plan.study.scenario}",
+        plan.study.scenario,
         cost,
         compared,
         [ChartLine(name, line, _orders(line, compared, uncertainty)) for name, line in lines.items()],

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...orchestrator.results.comparison import Measure
+from ..point import told
 from ..trial import Trial
 
 #: What a point costs: seconds of the wall clock where it ran alone, else of the processor.
@@ -35,6 +36,13 @@ class Row:
     def solves(self) -> int:
         """Steps of all units together."""
         return 0 if self.trial is None else sum(self.trial.solves.values())
+
+    def value(self, key: str) -> Any:
+        """What the point's scenario has at `key`, set or not; None where it has nothing there."""
+        found: Any = {} if self.trial is None else self.trial.run.summary.get("scenario")
+        for part in key.split("."):
+            found = found.get(part) if isinstance(found, Mapping) else None
+        return found
 
     def cost(self, kind: str) -> float:
         """Seconds of the `kind` WALL or CPU; of points that are done."""
@@ -70,7 +78,7 @@ class Chart:
     """
 
     name: str
-    title: str
+    scenario: str
     cost: str
     measures: Sequence[Measure]
     lines: Sequence[ChartLine]
@@ -95,3 +103,14 @@ class Chart:
         """The units of all points that are done."""
         trials = [row.trial for row in self.rows if row.trial is not None and row.is_done]
         return list(dict.fromkeys(unit for trial in trials for unit in trial.solves))
+
+    def summary(self) -> str:
+        """For a terminal: of each measure the cheapest points of its front first."""
+        lines = [f"{self.name}: {sum(row.is_done for row in self.rows)} of {len(self.rows)} points are done"]
+        for measure in self.measures:
+            on = [(line, row) for line in self.lines for row in line.rows if measure.name in row.front]
+            lines.append(f"  front of {measure.name}:")
+            for line, row in sorted(on, key=lambda pair: pair[1].cost(self.cost)):
+                error = f"{row.errors[measure.name]:.3g} {measure.unit}".rstrip()
+                lines.append(f"    {row.cost(self.cost):8.2f} s  {error:>12}  {line.name}, {told(row.settings)}")
+        return "\n".join(lines)

@@ -1,0 +1,75 @@
+"""`cosim chart`: studies, which run scenarios many times."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from ..orchestrator.errors import InputError, Interrupted
+from .exit_codes import INTERRUPTED
+from .scenario_file import Assignments
+
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Run so many points at the same time, on a Dask cluster on this machine; processor seconds are compared "
+        "then. Default: one after the other.",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="tcp://HOST:PORT",
+        help="Run the points by the workers of this Dask scheduler, which have to see the same files.",
+    ),
+]
+
+
+def chart(
+    file: Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")],
+    output: Annotated[Path | None, typer.Option(help="Folder of the study; default results/<name>.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    assignments: Assignments = None,
+) -> None:
+    """Chart what settings of a scenario cost against how accurate they are.
+
+    Every point of the study is run once; a study that was interrupted goes on where it stopped.
+    """
+    # Imported here, so that help does not wait for numerical libraries.
+    from ..studies.bench import Bench
+    from ..studies.chart import chart_study, write_chart
+    from ..studies.plan import plan_study
+
+    _one_of(workers, scheduler)
+    plan = plan_study(file, assignments or [])
+    folder = output or Path("results") / plan.study.name
+    console = Console(stderr=True)
+    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+        charted = chart_study(plan, bench)
+        with console.status("drawing the chart"):
+            write_chart(charted, folder)
+    for note in charted.notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo(charted.summary())
+    typer.echo(f"  chart in {folder}")
+
+
+def _one_of(workers: int | None, scheduler: str | None) -> None:
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers starts workers of its own, and --scheduler has some; give one of the two")
+
+
+@contextmanager
+def _resumable(folder: Path) -> Iterator[None]:
+    """Say how to go on with a study that a signal stopped."""
+    try:
+        yield
+    except Interrupted as error:
+        print(f"interrupted; what is finished is in {folder}, and the same command goes on from there", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED + error.signal) from None

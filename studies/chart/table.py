@@ -1,0 +1,83 @@
+"""chart.csv, a row per point, and chart.json, what the numbers come from."""
+
+import csv
+import io
+import json
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from ...orchestrator.results.whole import write_whole
+from ..point import value_text
+from .model import Chart, Row
+
+CHART_CSV, CHART_JSON = "chart.csv", "chart.json"
+
+
+def write_tables(chart: Chart, folder: Path) -> None:
+    """Write both files to `folder`."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(_columns(chart))
+    for line in chart.lines:
+        for row in line.rows:
+            writer.writerow([line.name, *_cells(chart, row)])
+    write_whole(folder / CHART_CSV, text.getvalue().encode())
+    write_whole(folder / CHART_JSON, f"{json.dumps(_content(chart), indent=2)}\n".encode())
+
+
+def _columns(chart: Chart) -> list[str]:
+    names = [measure.name for measure in chart.measures]
+    return [
+        "line",
+        *chart.varied,
+        "status",
+        "reason",
+        *(f"error_{name}" for name in names),
+        "wall_s",
+        "wall_spread_s",
+        "runs",
+        "cpu_s",
+        *(f"cpu_s_{unit}" for unit in chart.units),
+        *(f"solves_{unit}" for unit in chart.units),
+        "sweeps",
+        *(f"front_{name}" for name in names),
+        "folder",
+    ]
+
+
+def _cells(chart: Chart, row: Row) -> list[Any]:
+    """What is not known stays empty."""
+    settings = [_setting(row, key) for key in chart.varied]
+    errors = [row.errors.get(measure.name, "") for measure in chart.measures]
+    trial = row.trial
+    if trial is None or not row.is_done:
+        front = [0] * len(chart.measures)
+        costs: list[Any] = [""] * (5 + 2 * len(chart.units))
+        folder = "" if trial is None else trial.folder.name
+        return [*settings, row.status, row.reason, *errors, *costs, *front, folder]
+    costs = [trial.wall_s, trial.wall_spread_s, len(trial.costs), trial.cpu_s]
+    costs += [trial.unit_cpu_s(unit) if unit in trial.solves else "" for unit in chart.units]
+    costs += [trial.solves.get(unit, "") for unit in chart.units]
+    front = [int(measure.name in row.front) for measure in chart.measures]
+    return [*settings, row.status, row.reason, *errors, *costs, trial.sweeps, *front, trial.folder.name]
+
+
+def _setting(row: Row, key: str) -> str:
+    """A varied value; of a line that does not vary the key what its scenario has there."""
+    return value_text(row.settings[key]) if key in row.settings else value_text(row.value(key)) if row.trial else ""
+
+
+def _content(chart: Chart) -> dict[str, Any]:
+    return {
+        "study": chart.name,
+        "scenario": chart.scenario,
+        "cost": chart.cost,
+        "machine": dict(chart.machine),
+        "versions": dict(chart.versions),
+        "reference": list(chart.references),
+        "uncertainty": {name: value if isfinite(value) else None for name, value in chart.uncertainty.items()},
+        "measures": {measure.name: {"unit": measure.unit, "what": measure.description} for measure in chart.measures},
+        "orders": {line.name: dict(line.orders) for line in chart.lines},
+        "notes": list(chart.notes),
+    }

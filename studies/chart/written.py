@@ -1,0 +1,11 @@
+"""A chart in its folder: tables, figures and a page."""
+
+from pathlib import Path
+
+from .model import Chart
+from .table import write_tables
+
+
+def write_chart(chart: Chart, folder: Path) -> None:
+    """Write chart.csv, chart.json, chart.png, chart.svg and chart.html to `folder`."""
+    write_tables(chart, folder)
