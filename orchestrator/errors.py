@@ -5,6 +5,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from .quoting import shortened
+from .stopwatch import Usage
 
 
 class InputError(Exception):
@@ -39,10 +40,12 @@ class Interrupted(Exception):
 class ParticipantError(Exception):
     """A participant could not do what the master asked; the master adds when it was.
 
-    `unit` is the name of the participant, as soon as it is known.
+    `unit` is the name of the participant, as soon as it is known; `usage` is what the call took until it failed, where
+    only the participant knows.
     """
 
     unit: str | None = None
+    usage: Usage | None = None
 
 
 class ParticipantLost(ParticipantError):

@@ -11,6 +11,7 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from .assembly import assemble, called_directly, checked_mesh
+from .costs import Costs
 from .coupling.master import Observer
 from .drawing import Drawing
 from .errors import InputError, Interrupted, RunError
@@ -22,7 +23,6 @@ from .results.origin import Origin
 from .scenario import Scenario
 from .show import describe
 from .stopping import StopRequest
-from .wall_clock import WallClock
 
 #: From a scenario, and the folder that its paths are relative to, to its mesh, if it has one.
 MeshOf = Callable[[Scenario, Path], Mesh | None]
@@ -102,8 +102,8 @@ def _run(
         ready = time.perf_counter()
         unready = None
         with folder.fitting() if before is not None else nullcontext():
-            kept = None if before is None else before["wall"]
-            wall = WallClock(master.watch, list(assembly.participants), started, ready, kept)
+            kept = None if before is None else before["costs"]
+            costs = Costs(master, list(assembly.participants), started, ready, kept)
         try:
             if before is None:
                 master.initialise()
@@ -120,7 +120,7 @@ def _run(
                 implementation.check(before["implementation"], implementations)
         _warn(console, implementation.fallbacks(implementations.values()))
         # Nothing in the folder was touched up to here.
-        recording = folder.record(assembly, before, wall, implementations)
+        recording = folder.record(assembly, before, costs, implementations)
         bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
         with recording, bar:
             if unready is not None:

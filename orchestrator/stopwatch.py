@@ -1,10 +1,22 @@
-"""Wall-clock time by who used it."""
+"""Wall-clock and CPU time by who used it."""
 
 import time
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Usage:
+    """Seconds of the clock and of the CPU that a call took, told by whoever did it; `apart` from this process or not.
+
+    CPU time is that of the thread that did it.
+    """
+
+    wall_s: float
+    cpu_s: float
+    apart: bool = False
 
 
 @dataclass(frozen=True)
@@ -18,10 +30,15 @@ class Span:
 
 
 class Stopwatch:
-    """Seconds spent, by label: in all (`total`), and as spans since the last `lap`."""
+    """Seconds spent, by label: in all (`total`), and as spans since the last `lap`.
+
+    `cpu` is the CPU time by label, as far as it was charged, and `cpu_apart` what of it other processes used.
+    """
 
     def __init__(self) -> None:
         self.total: defaultdict[str, float] = defaultdict(float)
+        self.cpu: defaultdict[str, float] = defaultdict(float)
+        self.cpu_apart = 0.0
         self._spans: list[Span] = []
 
     @contextmanager
@@ -37,6 +54,12 @@ class Stopwatch:
         """Add a span that was measured elsewhere."""
         self.total[label] += seconds
         self._spans.append(Span(label, what, begin, seconds))
+
+    def charge(self, label: str, usage: Usage) -> None:
+        """Add the CPU time of `usage` to that of `label`."""
+        self.cpu[label] += usage.cpu_s
+        if usage.apart:
+            self.cpu_apart += usage.cpu_s
 
     def lap(self) -> tuple[Span, ...]:
         """The spans since the last call."""

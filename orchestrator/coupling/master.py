@@ -3,11 +3,12 @@
 Whatever ends the loop, those who watch it (`Observer`) have seen every accepted step before.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from time import perf_counter
+from time import perf_counter, thread_time
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,7 +24,7 @@ from ..errors import (
     did_you_mean,
 )
 from ..participants.participant import Participant, Wait
-from ..stopwatch import Span, Stopwatch, seconds_by_label
+from ..stopwatch import Span, Stopwatch, Usage, seconds_by_label
 from .connections import Connection
 from .exchange import Exchange, Inputs, blaming
 from .loops import groups_in_order
@@ -86,6 +87,15 @@ class Master:
         Chooses the steps; every tick of the timeline if not given. One that refuses steps needs units that roll back.
     every:
         Units that are stepped only at every so-many-th exchange, and at output times; the others at each.
+
+    Attributes
+    ----------
+    solves:
+        How many steps each unit was asked to take, those of sweeps that were repeated and of steps that were refused
+        or failed included.
+    sweeps:
+        How many sweeps over the units there were: one for each explicit step; for an iterated one, as many as the loop
+        needed that needed most of them. Those of steps that were refused or failed are counted too.
     """
 
     def __init__(
@@ -104,6 +114,8 @@ class Master:
         self.units = stepping_order(participants, order)
         self.exchange = Exchange(participants, connections, inputs)
         self.watch = Stopwatch()
+        self.solves: Counter[str] = Counter()
+        self.sweeps = 0
         self._scheme = scheme
         self._timeline = timeline
         self._control = control or FixedStep()
@@ -179,6 +191,8 @@ class Master:
             "number": self._number,
             "reached": dict(self._reached),
             "passed": dict(self._passed),
+            "solves": {unit: self.solves[unit] for unit in self.units},
+            "sweeps": self.sweeps,
             "states": states,
             "exchange": self.exchange.memory(),
             "scheme": self._scheme.memory(),
@@ -193,6 +207,8 @@ class Master:
                 self.participants[unit].unpack(memory["states"][unit].tobytes())
             self._reached[unit] = int(memory["reached"][unit])
             self._passed[unit] = int(memory["passed"][unit])
+            self.solves[unit] = int(memory["solves"][unit])
+        self.sweeps = int(memory["sweeps"])
         self._tick, self._number = int(memory["tick"]), int(memory["number"])
         self.exchange.resume(memory["exchange"])
         self._scheme.resume(memory.get("scheme", {}))
@@ -208,12 +224,18 @@ class Master:
 
     def _begin(self, unit: str) -> None:
         with blaming(unit):
-            self.participants[unit].begin()
+            self._charged(unit, self.participants[unit].begin)
 
     def _complete(self, unit: str) -> None:
         with blaming(unit):
-            self.participants[unit].complete()
+            self._charged(unit, self.participants[unit].complete)
         self.exchange.collect(unit, initially=True)
+
+    def _charged(self, unit: str, call: Callable[[], Usage | None]) -> None:
+        """Do a `call` of `unit`, and charge it with the CPU time of that."""
+        begin, cpu = perf_counter(), thread_time()
+        usage = call()
+        self.watch.charge(unit, usage or Usage(perf_counter() - begin, thread_time() - cpu))
 
     def _settle(self, loop: Sequence[str]) -> None:
         """Initialise the units of a loop together, with initial values that agree."""
@@ -278,9 +300,10 @@ class Master:
         Why a unit or the coupling failed in a step that can be repeated shorter is added to `causes`, once.
         """
         self.exchange.begin(end_ms / _MS_PER_S)
+        asked = Counter[str]()
         with Rollback(self.participants, units if self._control.refuses else ()) as before:
             try:
-                sweeps = self._scheme.advance(units, self.exchange, partial(self._step, self._tick + ticks))
+                sweeps = self._scheme.advance(units, self.exchange, partial(self._step, self._tick + ticks, asked))
                 verdict = self._control.judge(self.exchange, ticks)
                 if verdict.accepted:
                     return sweeps, verdict
@@ -290,6 +313,10 @@ class Master:
                 if final or not self._control.shorten(ticks):
                     raise
                 causes.setdefault(str(error), _cause(error, self._timeline.size_ms(ticks)))
+            finally:
+                self.solves.update(asked)
+                # A sweep steps each of its units once.
+                self.sweeps += max(asked.values(), default=1)
             before.restore()
             self.exchange.undo()
         return None
@@ -301,31 +328,37 @@ class Master:
             return list(self.units)
         return [unit for unit in self.units if self._passed[unit] + 1 >= self._every.get(unit, 1)]
 
-    def _step(self, end: int, units: Sequence[str]) -> None:
-        """Step `units` at the same time, each from where it is to the tick `end`."""
-        started: list[tuple[str, float, float, Wait]] = []
+    def _step(self, end: int, asked: Counter[str], units: Sequence[str]) -> None:
+        """Step `units` at the same time, each from where it is to the tick `end`, and count them as `asked`."""
+        started: list[tuple[str, float, Usage, Wait]] = []
         failure: ParticipantError | None = None
         with self.watch.measure(WAITING, "units"):
             for unit in units:
-                begin, reached = perf_counter(), self._reached[unit]
+                begin, cpu, reached = perf_counter(), thread_time(), self._reached[unit]
+                asked[unit] += 1
                 time, size = self._timeline.time_ms(reached), self._timeline.size_ms(end - reached)
                 try:
                     with blaming(unit):
                         wait = self.participants[unit].start(time / _MS_PER_S, size / _MS_PER_S)
                 except ParticipantError as error:
                     failure = failure or error
-                    self.watch.add(unit, "failed step", begin, perf_counter() - begin)
+                    here = Usage(perf_counter() - begin, thread_time() - cpu)
+                    self.watch.add(unit, "failed step", begin, here.wall_s)
+                    self.watch.charge(unit, here)
                 else:
-                    started.append((unit, begin, perf_counter() - begin, wait))
+                    here = Usage(perf_counter() - begin, thread_time() - cpu)
+                    started.append((unit, begin, here, wait))
             # All are waited for, even if one has failed: none may be busy when it is spoken to again.
-            for unit, begin, busy, wait in started:
+            for unit, begin, here, wait in started:
                 try:
                     with blaming(unit):
-                        elsewhere = wait()
-                    self.watch.add(unit, "step", begin, busy if elsewhere is None else elsewhere)
+                        usage = wait() or here
+                    self.watch.add(unit, "step", begin, usage.wall_s)
+                    self.watch.charge(unit, usage)
                 except ParticipantError as error:
                     failure = failure or error
                     self.watch.add(unit, "failed step", begin, perf_counter() - begin)
+                    self.watch.charge(unit, error.usage or here)
         if failure is not None:
             raise failure
 

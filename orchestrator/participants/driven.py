@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, did_you_mean
+from ..stopwatch import Usage
 from .participant import Abilities, Implementation, Participant, Ports, Ramp, Values, Wait
 from .signals import Signal, read_table
 
@@ -26,15 +27,16 @@ class Driven:
         self.observed: Ports = participant.observed
         self.abilities: Abilities = participant.abilities
 
-    def begin(self) -> None:
+    def begin(self) -> Usage | None:
         """See Participant."""
-        self._participant.begin()
+        usage = self._participant.begin()
         for name, signal in self.signals.items():
             self._participant.set(name, signal.at(0.0, 0.0))
+        return usage
 
-    def complete(self) -> None:
+    def complete(self) -> Usage | None:
         """See Participant."""
-        self._participant.complete()
+        return self._participant.complete()
 
     def set(self, name: str, values: Values) -> None:
         """See Participant."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, did_you_mean
+from ..stopwatch import Usage
 
 #: Numbers of whatever type, or texts; those of real ports are float64.
 Values = NDArray[Any]
@@ -173,9 +174,9 @@ class Implementation:
     fallbacks: tuple[str, ...] = ()
 
 
-#: Waits for the end of a step that was started, and raises what went wrong in it. Returns the seconds that the step
-#: took, where only the participant knows; None where it was done when it was started.
-Wait = Callable[[], float | None]
+#: Waits for the end of a step that was started, and raises what went wrong in it. Returns what the step took, where
+#: only the participant knows; None where this thread had done it when it was started.
+Wait = Callable[[], Usage | None]
 
 
 class Participant(Protocol):
@@ -191,11 +192,11 @@ class Participant(Protocol):
     observed: Ports
     abilities: Abilities
 
-    def begin(self) -> None:
-        """Set the experiment up and enter the initialization mode."""
+    def begin(self) -> Usage | None:
+        """Set the experiment up and enter the initialization mode; what that took, where this thread did not do it."""
 
-    def complete(self) -> None:
-        """Exit the initialization mode: outputs have their initial values."""
+    def complete(self) -> Usage | None:
+        """Exit the initialization mode: outputs have their initial values; what that took, as for `begin`."""
 
     def set(self, name: str, values: Values) -> None:
         """Set an input."""

@@ -4,10 +4,11 @@ A process costs about a millisecond per call, and its death takes nobody else al
 to be installed in the same version; FMUs are sent there.
 """
 
+from collections.abc import Callable
 from contextlib import suppress
 from itertools import cycle
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, thread_time
 from types import TracebackType
 from typing import Any
 
@@ -16,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from ..cluster import Cluster
 from ..errors import InputError, ParticipantError, ParticipantLost
+from ..stopwatch import Usage
 from .participant import Abilities, Implementation, Participant, Ports, Ramp, Values, Wait
 from .recipe import Recipe
 
@@ -27,6 +29,7 @@ class Workers:
     """Where actors are made, one worker for each of `count`; `where` is `threads`, `processes` or an address."""
 
     def __init__(self, where: str, count: int, limit_s: float | None) -> None:
+        self._where = where
         self._limit_s = limit_s
         self._cluster = Cluster(where, count, "run.workers")
         # Units share workers only where there are fewer workers than units.
@@ -36,7 +39,8 @@ class Workers:
         """The participant of `recipe`, in the next worker."""
         sent = recipe if self._cluster.is_ours else recipe.portable()
         address = next(self._next)
-        future = self._cluster.client.submit(_Host, sent, actor=True, workers=[address], pure=False)
+        apart = self._where != "threads"
+        future = self._cluster.client.submit(_Host, sent, apart, actor=True, workers=[address], pure=False)
         try:
             actor = future.result(timeout=_PATIENCE_S)
         except InputError:
@@ -55,10 +59,14 @@ class Workers:
 
 
 class _Host:
-    """The actor: holds the participant where it works, and its saved states, which stay there."""
+    """The actor: holds the participant where it works, and its saved states, which stay there.
 
-    def __init__(self, recipe: Recipe) -> None:
+    `apart`: that is another process than the master's.
+    """
+
+    def __init__(self, recipe: Recipe, apart: bool) -> None:
         self._participant = recipe.make()
+        self._apart = apart
         # As where the master works, whoever started this process.
         threadpool_limits(limits=1)
         self._states: dict[int, Any] = {}
@@ -71,10 +79,27 @@ class _Host:
     def call(self, name: str, *arguments: Any) -> Any:
         return getattr(self._participant, name)(*arguments)
 
-    def step(self, time: float, size: float) -> float:
-        begin = perf_counter()
-        self._participant.start(time, size)()
-        return perf_counter() - begin
+    def begin(self) -> Usage:
+        return self._measured(self._participant.begin)
+
+    def complete(self) -> Usage:
+        return self._measured(self._participant.complete)
+
+    def step(self, time: float, size: float) -> Usage:
+        return self._measured(lambda: self._participant.start(time, size)())
+
+    def _measured(self, call: Callable[[], object]) -> Usage:
+        begin, cpu = perf_counter(), thread_time()
+
+        def usage() -> Usage:
+            return Usage(perf_counter() - begin, thread_time() - cpu, self._apart)
+
+        try:
+            call()
+        except ParticipantError as error:
+            error.usage = usage()
+            raise
+        return usage()
 
     def save(self) -> int:
         self._saved += 1
@@ -97,13 +122,15 @@ class RemoteParticipant:
         self._limit_s = limit_s
         self.inputs, self.outputs, self.observed, self.abilities = self._result(actor.describe())
 
-    def begin(self) -> None:
+    def begin(self) -> Usage:
         """See Participant."""
-        self._call("begin")
+        usage: Usage = self._result(self._ask("begin"))
+        return usage
 
-    def complete(self) -> None:
+    def complete(self) -> Usage:
         """See Participant."""
-        self._call("complete")
+        usage: Usage = self._result(self._ask("complete"))
+        return usage
 
     def set(self, name: str, values: Values) -> None:
         """See Participant."""
@@ -121,7 +148,7 @@ class RemoteParticipant:
     def start(self, time: float, size: float) -> Wait:
         """See Participant."""
         future = self._ask("step", time, size)
-        return lambda: float(self._result(future))
+        return lambda: self._result(future)
 
     def save(self) -> int:
         """See Participant; the state stays where it is, and has a number here."""

@@ -10,9 +10,9 @@ from types import TracebackType
 from typing import Any
 
 from ..assembly import Assembly
+from ..costs import Costs
 from ..errors import InputError
 from ..participants.participant import Implementation
-from ..wall_clock import WallClock
 from ..writing import allowed, remove_stale, writing
 from .checkpoint import Memories, read_checkpoint
 from .hdf5 import DamagedFile
@@ -95,7 +95,7 @@ class ResultsFolder:
         self,
         assembly: Assembly,
         before: Memories | None,
-        wall: WallClock,
+        costs: Costs,
         implementations: Mapping[str, Implementation],
     ) -> Recording:
         """Open the files of a run, or go on with those of one that left `before`; see Recording."""
@@ -108,7 +108,7 @@ class ResultsFolder:
         try:
             with writing(self.path / SUMMARY):
                 reserve(self.path / SUMMARY, _RESERVE)
-            return self._opened(assembly, before, wall, implementations)
+            return self._opened(assembly, before, costs, implementations)
         except BaseException:
             with suppress(OSError):
                 self._remove_leftovers()
@@ -120,7 +120,7 @@ class ResultsFolder:
         self,
         assembly: Assembly,
         before: Memories | None,
-        wall: WallClock,
+        costs: Costs,
         implementations: Mapping[str, Implementation],
     ) -> Recording:
         # First what would let the rest pass for the result of an earlier run.
@@ -136,7 +136,7 @@ class ResultsFolder:
             with writing(self.path / PARTS):
                 self._remove_parts()
         with allowed(self.path, "--output"), nullcontext() if before is None else self.fitting():
-            return Recording(self.path, self._origin, assembly, before, wall, implementations)
+            return Recording(self.path, self._origin, assembly, before, costs, implementations)
 
     def _check_places(self) -> None:
         """InputError where something is in the way of a file, before any is touched."""

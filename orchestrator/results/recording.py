@@ -9,11 +9,11 @@ from types import TracebackType
 from typing import Any
 
 from ..assembly import Assembly
+from ..costs import Costs
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..errors import InputError, Interrupted, RunError, Terminated
 from ..participants.participant import Implementation
-from ..wall_clock import WallClock
 from . import implementation
 from .appended import check
 from .checkpoint import Checkpoint, Memories
@@ -64,14 +64,14 @@ class Recording:
         origin: Origin,
         assembly: Assembly,
         before: Memories | None,
-        wall: WallClock,
+        costs: Costs,
         implementations: Mapping[str, Implementation],
     ) -> None:
         self.summary: dict[str, Any] = {}
         self._refusal: RunError | None = None
         self._folder, self._origin, self._assembly = folder, origin, assembly
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
-        self._wall = wall
+        self._costs = costs
         self._implementations = implementations
         self._fields: Fields | None = None
         self._iterations: IterationLog | None = None
@@ -101,7 +101,7 @@ class Recording:
         for participant in participants.values():
             participant.log_to((folder / FMU_LOG).absolute())
         self._recorders = recorders
-        memories = {"master": master.memory, "wall": self._wall.memory}
+        memories = {"master": master.memory, "costs": self._costs.memory}
         memories["implementation"] = partial(implementation.memory, implementations)
         memories |= {name: recorder.memory for name, recorder in recorders.items()}
         self._checkpoint = Checkpoint(folder, origin, memories)
@@ -160,10 +160,10 @@ class Recording:
             "warnings": [*self._assembly.warnings, *implementation.fallbacks(self._implementations.values())],
             "implementation": implementation.texts(self._implementations),
         }
-        scenario, seconds = self._assembly.scenario, self._wall.seconds()
+        scenario, costs = self._assembly.scenario, self._costs.content()
         path = self._folder / SUMMARY
         try:
-            self.summary = write_summary(path, scenario, self._origin, self._series, seconds, outcome)
+            self.summary = write_summary(path, scenario, self._origin, self._series, costs, outcome)
             if not resumable:
                 self._checkpoint.remove()
                 # Files that could not be completed may still refer to the frames.

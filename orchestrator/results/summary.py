@@ -24,6 +24,9 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
     "tolerance_missed": dict,
     "warnings": list,
     "wall_s": dict,
+    "cpu_s": dict,
+    "solves": dict,
+    "sweeps": int,
 }
 
 
@@ -32,13 +35,13 @@ def write_summary(
     scenario: Scenario,
     origin: Origin,
     series: TimeSeries,
-    seconds: Mapping[str, Any],
+    costs: Mapping[str, Any],
     outcome: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Write the summary of a finished or failed run and return it.
 
-    `origin` says what the numbers come from. `seconds` has the keys `total`, `master`, `units` (by name) and whatever
-    else was timed; `outcome` has `status`.
+    `origin` says what the numbers come from. `costs` has `wall_s`, with `total` and `master` in it, and whatever else
+    was measured; `outcome` has `status`.
     """
     time = series.column("time_ms")
 
@@ -68,7 +71,8 @@ def write_summary(
             if column.endswith("_volume_ml") and values[0] > 0.0:
                 ejected[column.removesuffix("_volume_ml")] = (values[0] - min(values)) / values[0]
     content["ejection_fraction"] = ejected
-    content["wall_s"] = dict(seconds)
+    content |= costs
+    seconds = costs["wall_s"]
     content["master_overhead"] = seconds["master"] / seconds["total"] if seconds["total"] else None
     content |= origin.content()
     write_whole(path, f"{json.dumps(content, indent=2, allow_nan=False)}\n".encode())

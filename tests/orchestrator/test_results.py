@@ -304,6 +304,14 @@ def test_the_summary_has_the_keys_of_the_contract(done: Outcome, small_heart_fil
     assert wall["total"] == pytest.approx(wall["master"] + sum(wall["units"].values()), rel=1e-2)
     assert summary["master_overhead"] == pytest.approx(wall["master"] / wall["total"])
     assert 0.0 < summary["master_overhead"] < 1.0
+    cpu = summary["cpu_s"]
+    assert set(cpu) == {"total", "units"}
+    assert set(cpu["units"]) == set(wall["units"])
+    assert min(cpu["units"].values()) > 0.0
+    # Both are read off clocks of one kind; what the master itself computes is in the total alone.
+    assert sum(cpu["units"].values()) < cpu["total"]
+    assert summary["solves"] == {"fibers": 0, "electrophysiology": 7, "active_stress": 7, "mechanics": 7}
+    assert summary["sweeps"] == 7
     assert {"python", "cardiac-cosim", "numpy", "fmpy"} <= set(summary["versions"])
     # The scenario as resolved, defaults written out, runs again as it is.
     (tmp_path / "again.yaml").write_text(json.dumps(summary["scenario"]))
@@ -315,15 +323,22 @@ def test_the_summary_has_the_keys_of_the_contract(done: Outcome, small_heart_fil
 def test_outputs_named_like_keys_of_the_summary_do_not_replace_them(
     fake, port, master, tmp_path: Path, small_heart: Mesh, small_heart_file: Path
 ) -> None:
-    outputs = [port("status"), port("end", unit="ms"), port("wall", unit="s"), port("empty_volume", unit="ml")]
+    outputs = [
+        port("status"),
+        port("end", unit="ms"),
+        port("wall", unit="s"),
+        port("sweeps"),
+        port("empty_volume", unit="ml"),
+    ]
     series = TimeSeries(tmp_path, {"a": fake("a", outputs=outputs)}, Probes(small_heart, {}))
-    seconds = {"total": 2.0, "master": 1.0, "units": {}}
-    series.rows.append([0.0, 1.0, 2.0, 3.0, 0.0])
+    costs = {"wall_s": {"total": 2.0, "master": 1.0, "units": {}}, "cpu_s": {}, "solves": {}, "sweeps": 7}
+    series.rows.append([0.0, 1.0, 2.0, 3.0, 4.0, 0.0])
     series.close()
     scenario = _scenario(small_heart_file)
     origin = Origin.of(scenario, tmp_path)
-    summary = write_summary(tmp_path / "s.json", scenario, origin, series, seconds, {"status": "done"})
-    assert (summary["status"], summary["end_ms"], summary["wall_s"]) == ("done", 0.0, seconds)
+    summary = write_summary(tmp_path / "s.json", scenario, origin, series, costs, {"status": "done"})
+    assert (summary["status"], summary["end_ms"], summary["wall_s"]) == ("done", 0.0, costs["wall_s"])
+    assert summary["sweeps"] == 7
     # Nothing is ejected from a cavity without volume.
     assert summary["ejection_fraction"] == {}
 
