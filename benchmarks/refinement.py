@@ -13,31 +13,11 @@ from cardiac_cosim.units.fiber_generator import FiberGenerator
 from cardiac_cosim.units.geometry.registry import build
 from cardiac_cosim.units.mechanics import Mechanics
 from cardiac_cosim.units.mesh import Mesh
-from cardiac_cosim.units.mesh.refinement import Refined, refined
+from cardiac_cosim.units.mesh.refinement import refined
 from cardiac_cosim.units.unit import Unit
 
 _APEX_MM = np.array([0.0, 0.0, -60.0])
 _STOP_MS, _STEP_MS = 130, 2
-
-
-def with_boundaries(mesh: Mesh, inner: Refined) -> Mesh:
-    """The refined mesh with the boundaries of the coarse one: a part of a face lies in its plane, at its parent."""
-    surface = inner.mesh.surface
-    centres = inner.mesh.points[surface].mean(axis=1)
-    boundaries = {}
-    for name, faces in mesh.boundaries.items():
-        corner, second, third = mesh.points[faces].transpose(1, 0, 2)
-        normal = np.cross(second - corner, third - corner)
-        edges = np.stack([second - corner, third - corner, normal], axis=2)
-        chosen = []
-        for start in range(0, len(centres), 500):
-            offset = centres[start : start + 500, None] - corner
-            first, other, away = np.moveaxis(np.linalg.solve(edges[None], offset[..., None])[..., 0], -1, 0)
-            on = (np.abs(away) < 1e-9) & (first > 0.0) & (other > 0.0) & (first + other < 1.0)
-            chosen.append(on.any(axis=1))
-        boundaries[name] = surface[np.concatenate(chosen)]
-    assert sum(map(len, boundaries.values())) == len(surface)
-    return Mesh(inner.mesh.points, inner.mesh.cells, boundaries)
 
 
 def started(unit: Unit, parameters: dict[str, float], inputs: dict[str, np.ndarray]) -> Unit:
@@ -95,8 +75,7 @@ if __name__ == "__main__":
     begin = perf_counter()
     _report("with feedback, refine: 1", heart, _beat(heart, own, {"refine": 1}, mechanics=True), begin)
     begin = perf_counter()
-    whole = with_boundaries(heart, fine)
     inherited = {name: values[fine.parents] for name, values in own.items()}
-    _report("with feedback, all refined once", heart, _beat(whole, inherited, {}, mechanics=True), begin)
+    _report("with feedback, all refined once", heart, _beat(fine.mesh, inherited, {}, mechanics=True), begin)
     begin = perf_counter()
     _report("with feedback, refine: 2", heart, _beat(heart, own, {"refine": 2}, mechanics=True), begin)

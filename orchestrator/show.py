@@ -29,7 +29,7 @@ def describe(assembly: Assembly) -> str:
     connections = assembly.connections
     order = stepping_order(participants, scenario.coupling.order)
     parts = {
-        "mesh": [] if mesh is None else list(_mesh(mesh)),
+        "mesh": [] if mesh is None or scenario.scene is None else list(_mesh(mesh, scenario.scene.refine)),
         "units": list(_units(scenario, participants)),
         "connections": [str(link) + _fixed(link, participants) for link in connections] or ["none"],
         "signals": list(_driven(scenario, participants)),
@@ -49,8 +49,11 @@ def describe(assembly: Assembly) -> str:
     return "\n".join(lines)
 
 
-def _mesh(mesh: Mesh) -> Iterator[str]:
+def _mesh(mesh: Mesh, levels: int) -> Iterator[str]:
     yield f"{mesh.nodes} nodes, {mesh.elements} {_ELEMENTS[mesh.dimension]}"
+    if mesh.dimension and levels:
+        coarse = mesh.elements // 2 ** (mesh.dimension * levels)
+        yield f"nested refinement of {coarse} {_ELEMENTS[mesh.dimension]}, {levels} level{'s' if levels > 1 else ''}"
     if mesh.dimension == 3:
         quality = element_quality(mesh)
         yield f"volume {mesh.volumes.sum() / 1000.0:.2f} ml, SICN {quality.min():.2f} to {quality.max():.2f}"
@@ -146,12 +149,13 @@ def _signals(participants: Mapping[str, Participant]) -> dict[str, list[str]]:
 
 
 def _warnings(scenario: Scenario, mesh: Mesh | None) -> Iterator[str]:
-    if mesh is not None and mesh.dimension:
+    if mesh is not None and mesh.dimension and scenario.scene is not None:
         longest = float(_edges(mesh).mean())
         if longest > _FRONT_MM / 2.0:
             yield (
                 f"elements of {longest:.1f} mm are coarse against a depolarising front of {_FRONT_MM:g} mm: "
-                "waves are too fast (consistent mass) or too slow (lumped); compare with a finer mesh_size_mm"
+                "waves are too fast (consistent mass) or too slow (lumped); "
+                f"compare with scene.refine: {scenario.scene.refine + 1}"
             )
     coupling = scenario.coupling
     if mesh is not None and coupling.adaptive is None and coupling.step_ms > _UPSTROKE_MS:

@@ -16,6 +16,7 @@ from ...units.mesh.file import read_mesh
 from ...units.mesh.frame import check_frame, frame_warnings
 from ...units.mesh.places import Places
 from ...units.mesh.quality import signed_inverse_condition_number
+from ...units.mesh.refinement import check_levels, refined
 from ...units.mesh.wall import wall_warnings
 from ...units.registry import UNITS
 from ...units.snapshot import Snapshot
@@ -44,11 +45,17 @@ __all__ = [
 
 
 def scene_mesh(scene: Scene, folder: Path) -> Mesh:
-    """The mesh of `scene`; a mesh file's path is relative to `folder`. InputError if there is none to be had."""
+    """The mesh of `scene`, refined as it says; a mesh file's path is relative to `folder`.
+
+    InputError if there is none to be had, or if it is refined to more elements than a computer holds.
+    """
     try:
         if scene.mesh is not None:
-            return read_mesh(folder / scene.mesh, scene.boundaries, scene.unit_mm)
-        return build_geometry(str(scene.geometry), scene.mesh_size_mm)
+            mesh = read_mesh(folder / scene.mesh, scene.boundaries, scene.unit_mm)
+        else:
+            mesh = build_geometry(str(scene.geometry), scene.mesh_size_mm)
+        check_levels(mesh, scene.refine, "`refine`")
+        return refined(mesh, scene.refine).mesh
     except InvalidInput as error:
         raise InputError(str(error)) from None
 

@@ -99,6 +99,9 @@ def _scale(value: Any) -> Any:
     return value
 
 
+#: Nested refinements of a mesh: six make a quarter of a million tetrahedra of each.
+_MOST_LEVELS = 6
+
 #: Characters in the name of a group in a mesh file.
 _LONGEST_GROUP = 200
 
@@ -108,7 +111,7 @@ _SCALES = (1e-6, 1e6)
 
 
 class Scene(_Section):
-    """The anatomy: a named geometry at a mesh size, or a mesh file.
+    """The anatomy: a named geometry at a mesh size, or a mesh file; either is refined `refine` times.
 
     `boundaries` says which groups of the file, by name or number, make up a boundary; `scale` is the unit of length of
     its coordinates, or a factor.
@@ -117,6 +120,7 @@ class Scene(_Section):
     geometry: str | None = None
     mesh: FilePath | None = None
     mesh_size_mm: Positive = 5.0
+    refine: Annotated[int, Field(ge=0, le=_MOST_LEVELS)] = 0
     boundaries: dict[str, Annotated[Any, AfterValidator(_groups)]] = Field(default_factory=dict)
     scale: Annotated[Any, AfterValidator(_scale)] = None
 

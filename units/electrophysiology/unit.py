@@ -30,7 +30,7 @@ from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
 from ..input_ramp import InputRamp
-from ..mesh.refinement import refined
+from ..mesh.refinement import check_levels, refined
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import VOLTAGE, Causality, Location, Record, Variable, parameter, parameters_of
@@ -44,8 +44,8 @@ from .progress import NOT_ACTIVATED, Limits, Progress
 from .stimulus import Stimulus
 from .time_scale import TimeScale
 
-#: Substeps of a communication step, and elements and levels of a refinement, that nobody would wait for.
-_MOST_SUBSTEPS, _MOST_ELEMENTS, _MOST_LEVELS = 100_000, 8_000_000, 25
+#: Substeps of a communication step that nobody would wait for.
+_MOST_SUBSTEPS = 100_000
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,8 @@ class Electrophysiology(Unit):
                 "the explicit step of the ionic model does not resolve the upstroke"
             )
         self._probes = self.parameters(Probes).places(self.mesh)
-        self._inner = refined(self.mesh, self._checked_levels())
+        check_levels(self.mesh, self._resolution.refine, "parameter 'refine'")
+        self._inner = refined(self.mesh, self._resolution.refine)
         inherited = fiber[self._inner.parents]
         equation = Monodomain(self._inner.mesh, inherited, time_scale, self.parameters(Conduction), clock)
         limits = Limits(
@@ -214,16 +215,6 @@ class Electrophysiology(Unit):
         potential = self._scale.rest_potential_mV + self._scale.potential_range_mV * phi
         potential.setflags(write=False)
         return potential
-
-    def _checked_levels(self) -> int:
-        levels, dimension = self._resolution.refine, self.mesh.dimension
-        elements = self.mesh.elements * 2 ** (dimension * min(levels, _MOST_LEVELS))
-        if dimension and levels and (levels > _MOST_LEVELS or elements > _MOST_ELEMENTS):
-            raise InvalidInput(
-                f"parameter 'refine' is {levels}, which makes {elements:.3g} elements or more of {self.mesh.elements}; "
-                f"more than {_MOST_ELEMENTS:.0e} are refused: take fewer levels"
-            )
-        return levels
 
     @property
     def _lowest_potential(self) -> float:
