@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
-from distributed import FIRST_COMPLETED, Future, wait
+from distributed import Future, wait
 from distributed.scheduler import KilledWorker
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -176,6 +176,6 @@ def _look(mark: str) -> tuple[str, bool]:
 def _finished(running: Iterable[Future]) -> list[Future]:
     futures = list(running)
     try:
-        return list(wait(futures, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done)
+        return list(wait(futures, timeout=_LOOK_S, return_when="FIRST_COMPLETED").done)
     except TimeoutError:
         return []
