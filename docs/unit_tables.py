@@ -4,7 +4,10 @@ from pathlib import Path
 
 from cardiac_cosim.units.registry import UNITS
 from cardiac_cosim.units.unit import FALLBACKS, IMPLEMENTATION, Unit
-from cardiac_cosim.units.variable import Causality, Location, Variable
+from cardiac_cosim.units.variable import Causality, Location, Refinement, Variable
+
+#: What makes the error smaller.
+_REFINED_BY = {Refinement.STEP: "dividing it", Refinement.MESH: "raising it", Refinement.TOLERANCE: "dividing it"}
 
 PAGE = Path(__file__).parent / "units.md"
 
@@ -14,7 +17,11 @@ def page() -> str:
     origin = "Written by `python docs/unit_tables.py` from the declarations in `units/`."
     told = " and ".join(f"`{item.name}`, {item.description}" for item in (IMPLEMENTATION, FALLBACKS))
     both = f"Every unit has two texts besides, calculated parameters in FMI, once it is initialised: {told}."
-    parts = [f"# The units and their variables\n\n{origin}\n\n{both}\n"]
+    marked = (
+        "Parameters marked **accuracy** decide the numerical error of their unit, by an internal time step, the mesh "
+        "or a tolerance; the physics stays the same."
+    )
+    parts = [f"# The units and their variables\n\n{origin}\n\n{both}\n\n{marked}\n"]
     return "\n".join(parts + [_unit(unit) for unit in UNITS.values()])
 
 
@@ -31,7 +38,8 @@ def _unit(unit: type[Unit]) -> str:
     ]
     lines += ["", "| parameter | default | unit | range | description |", "|---|---|---|---|---|"]
     lines += [
-        f"| `{item.name}` | {item.start} | {item.unit} | {_range(item)} | {item.description} |" for item in parameters
+        f"| `{item.name}` | {item.start} | {item.unit} | {_range(item)} | {item.description}{_accuracy(item)} |"
+        for item in parameters
     ]
     return "\n".join(lines) + "\n"
 
@@ -45,6 +53,12 @@ def _note(variable: Variable) -> str:
     notes = ["once, at initialisation"] if variable.fixed else []
     notes += [f"only where `{variable.needs}` is not 0"] if variable.needs else []
     return f" ({', '.join(notes)})" if notes else ""
+
+
+def _accuracy(variable: Variable) -> str:
+    if variable.refines is None:
+        return ""
+    return f" (**accuracy**, {variable.refines.value}: {_REFINED_BY[variable.refines]} makes the error smaller)"
 
 
 def _range(variable: Variable) -> str:

@@ -45,6 +45,17 @@ class Record(Enum):
     PROBES = "probes"
 
 
+class Refinement(Enum):
+    """How a parameter makes the numerical error of its unit smaller, told to those who know no physics."""
+
+    #: The longest internal time step: the error falls as it is divided.
+    STEP = "step"
+    #: A count of nested refinements of a mesh: the error falls as it is raised, each level halves h.
+    MESH = "mesh"
+    #: A tolerance of an internal solver: the error falls as it is divided.
+    TOLERANCE = "tolerance"
+
+
 @dataclass(frozen=True)
 class Variable:
     """One variable of a unit.
@@ -54,6 +65,7 @@ class Variable:
     value after initialisation. `needs` names a parameter that must differ from zero for the input to matter.
     `guess`, by component, stands in for a fixed input that has no sensible default, for as long as it is not given.
     `missing` is the value at places that have none yet; `mean_record` says of a field what `record` says of its mean.
+    `refines` says of a number that it decides the unit's numerical error, and how; it needs a lower limit.
     """
 
     name: str
@@ -75,6 +87,7 @@ class Variable:
     at_least: float | None = None
     below: float | None = None
     choices: tuple[str, ...] = ()
+    refines: Refinement | None = None
 
     def shape(self, mesh: Mesh) -> tuple[int, ...]:
         """Array shape on `mesh`: () for a scalar, (places,) or (places, components) for a field."""

@@ -1,6 +1,7 @@
 """The one door to the units' floor: meshes, declarations, and units as participants without FMI."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,12 +26,14 @@ from ...units.unit import Unit
 from ...units.variable import Causality, Variable
 from ..errors import InputError, ParticipantError, did_you_mean
 from ..scenario import Scene
+from .accuracy import AccuracyParameter
 from .participant import Abilities, Implementation, Parameters, Port, Ports, Ramp, Values, Wait
 from .ramping import PendingRamps
 
 __all__ = [
     "Mesh",
     "NativeParticipant",
+    "accuracy_parameters",
     "check_mesh",
     "check_unit",
     "element_quality",
@@ -97,11 +100,7 @@ def packed_mesh(mesh: Mesh) -> bytes:
 
 def check_unit(unit: str, parameters: Parameters) -> None:
     """InputError if there is no such unit, or if it has no such parameter or none with such a value."""
-    if unit not in UNITS:
-        raise InputError(f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}")
-    declared = {
-        variable.name: variable for variable in UNITS[unit].variables() if variable.causality is Causality.PARAMETER
-    }
+    declared = _declared_parameters(unit)
     for name, value in parameters.items():
         if name not in declared:
             raise InputError(f"unit '{unit}' has no parameter '{name}'{did_you_mean(name, declared)}")
@@ -109,6 +108,30 @@ def check_unit(unit: str, parameters: Parameters) -> None:
             declared[name].checked(value)
         except InvalidInput as error:
             raise InputError(str(error)) from None
+
+
+def accuracy_parameters(unit: str) -> Mapping[str, AccuracyParameter]:
+    """The parameters that decide the numerical error of a unit, by name; InputError if there is no such unit."""
+    return {
+        name: AccuracyParameter(name, variable.refines.value, variable.start, *_lower_limit(variable))
+        for name, variable in _declared_parameters(unit).items()
+        if variable.refines is not None and isinstance(variable.start, int | float)
+    }
+
+
+def _lower_limit(variable: Variable) -> tuple[float, bool]:
+    """The lower limit of a parameter, and whether it is allowed itself."""
+    if variable.at_least is not None:
+        return variable.at_least, True
+    return (-inf if variable.above is None else variable.above), False
+
+
+def _declared_parameters(unit: str) -> dict[str, Variable]:
+    if unit not in UNITS:
+        raise InputError(f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}")
+    return {
+        variable.name: variable for variable in UNITS[unit].variables() if variable.causality is Causality.PARAMETER
+    }
 
 
 def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Ports]:

@@ -33,7 +33,7 @@ from ..input_ramp import InputRamp
 from ..mesh.refinement import check_levels, refined
 from ..snapshot import State
 from ..unit import Unit
-from ..variable import VOLTAGE, Causality, Location, Record, Variable, parameter, parameters_of
+from ..variable import VOLTAGE, Causality, Location, Record, Refinement, Variable, parameter, parameters_of
 from .compiled import CompiledIntegration, compiled
 from .integration import Integration
 from .ionic.model import IonicModel
@@ -65,8 +65,16 @@ class PotentialScale:
 class Resolution:
     """How finely the unit solves inside, in time and in space."""
 
-    longest_substep_ms: float = parameter(0.25, "ms", "longest substep inside a communication step", at_least=1e-4)
-    refine: int = parameter(0, "1", "nested refinements of the mesh to solve on; each halves the elements", at_least=0)
+    longest_substep_ms: float = parameter(
+        0.25, "ms", "longest substep inside a communication step", at_least=1e-4, refines=Refinement.STEP
+    )
+    refine: int = parameter(
+        0,
+        "1",
+        "nested refinements of the mesh to solve on; each halves the elements",
+        at_least=0,
+        refines=Refinement.MESH,
+    )
 
 
 class Electrophysiology(Unit):

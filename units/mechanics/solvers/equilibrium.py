@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import FloatArray
 from ...errors import StepFailure
-from ...variable import parameter
+from ...variable import Refinement, parameter
 from ..solid import Solid
 from .factored import Factored, Factors, NotConverged, Solution
 from .factorisation import Factorisation
@@ -31,6 +31,7 @@ class Convergence:
         "largest nodal residual force, over shear modulus times element size squared; stretches err by a tenth of it",
         above=0.0,
         below=1e-2,
+        refines=Refinement.TOLERANCE,
     )
     newton_iterations: int = parameter(
         25, "1", "Newton iterations before the load step is halved", at_least=1, below=1001
