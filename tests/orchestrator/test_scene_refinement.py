@@ -23,7 +23,7 @@ _QUIET = (
 
 
 def _run(path: Path, out: Path, *sets: str, resume: bool = False) -> dict[str, Any]:
-    return run_scenario(load_scenario(path, sets), path.parent, out, None, path.parent, resume).summary
+    return run_scenario(load_scenario(path, sets), path.parent, out, resume=resume).summary
 
 
 def _last(out: Path, name: str) -> np.ndarray:
