@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..orchestrator.assembly import check_units
-from ..orchestrator.errors import InputError
+from ..orchestrator.errors import InputError, did_you_mean
 from ..orchestrator.scenario import (
     Contradiction,
     Scenario,
@@ -59,9 +59,12 @@ class Variants:
 
     def __init__(self, file: Path, common: Mapping[str, Any], origin: str) -> None:
         self.file = file
-        self._content = scenario_content(file)
         self._common = dict(common)
         self._origin = origin
+        try:
+            self._content = scenario_content(file)
+        except InputError as error:
+            raise InputError(f"{origin}: {error}" if origin != str(file) else str(error)) from None
 
     def scenario(self, settings: Mapping[str, Any], where: str = "") -> Scenario:
         """The scenario with these settings on top of the common ones; `where` says where they stand in the study.
@@ -75,8 +78,9 @@ class Variants:
         """
         both = self._common | dict(settings)
         with_them = f" with {told(both)}" if both else ""
-        told_origin = f"{self._origin}: {where}: {self.file}{with_them}" if where else f"{self._origin}{with_them}"
+        told_origin = f"{self._origin}: {where}{with_them}" if where else f"{self._origin}{with_them}"
         try:
+            self._check_units(both)
             content = with_settings(self._content, both)
         except InputError as error:
             raise InputError(f"{told_origin}: {error}") from None
@@ -86,6 +90,14 @@ class Variants:
         except InputError as error:
             raise InputError(f"{told_origin}: {error}") from None
         return scenario
+
+    def _check_units(self, settings: Mapping[str, Any]) -> None:
+        """InputError for a setting of a unit that the scenario does not have: it would become one without content."""
+        units = self._content.get("units")
+        for key in settings:
+            section, *rest = key.split(".")
+            if section == "units" and len(rest) > 1 and isinstance(units, dict) and rest[0] not in units:
+                raise InputError(f"'{key}': the scenario has no unit '{rest[0]}'{did_you_mean(rest[0], units)}")
 
     def point(self, settings: Mapping[str, Any], where: str = "") -> Point:
         """The same as a point."""
@@ -134,7 +146,7 @@ def _planned(variants: Variants, line: Line, path: Path) -> list[Planned]:
             point = variants.point(dict(line.set) | settings, where)
             found.append(Planned(settings, Point(point.scenario, point.base, settings)))
         except Contradiction as error:
-            found.append(Planned(settings, None, str(error).removeprefix(f"{path}: {where}: ")))
+            found.append(Planned(settings, None, error.problem))
     if all(planned.point is None for planned in found):
         raise InputError(f"{path}: {where}: none of its points can be run, the first because of {found[0].reason}")
     return found

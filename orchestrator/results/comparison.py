@@ -55,16 +55,18 @@ def measures(run: StoredRun) -> dict[str, Measure]:
     `activation_ms` is the largest difference of the activation at any probe. Every column of numbers in the time
     series gives the largest difference at any time, and every field that moves the root mean square over its nodes or
     elements, at the time at which that is largest. Of a field of times (`activation_time_ms`) the last frame counts.
+    What never changes measures nothing, and is left out.
     """
     found = {}
     times = run.summary.get("activation_time_ms") or {}
     if any(time is not None for time in times.values()):
         found[ACTIVATION] = Measure(ACTIVATION, "ms", "activation at the probes, largest difference", _activation)
-    for column in run.columns:
-        if column != "time_ms":
+    for column, values in run.columns.items():
+        known = values[np.isfinite(values)]
+        if column != "time_ms" and len(known) and np.any(known != known[0]):
             text = f"{_spoken(column)}, largest difference at any time"
             found[column] = Measure(column, unit_of(column), text, partial(_curve, column))
-    for name in run.moving:
+    for name in filter(partial(_moves, run), run.moving):
         compare: Callable[[str, StoredRun, StoredRun], Difference] = _events if name.endswith(_EVENTS) else _field
         when = "at the end" if name.endswith(_EVENTS) else "at the worst time"
         text = f"{_spoken(name)}, root mean square over the mesh {when}"
@@ -81,6 +83,12 @@ def unit_of(name: str) -> str:
 def _spoken(name: str) -> str:
     unit = unit_of(name)
     return (name.removesuffix(f"_{unit}") if unit else name).replace("_", " ")
+
+
+def _moves(run: StoredRun, name: str) -> bool:
+    """Whether a field changes from the first frame to any other; the last one is looked at first."""
+    frames = range(len(run.frames_ms) - 1, 0, -1)
+    return any(not np.array_equal(_part(run, name, 0), _part(run, name, frame)) for frame in frames)
 
 
 def _activation(run: StoredRun, reference: StoredRun) -> Difference:

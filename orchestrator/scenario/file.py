@@ -22,7 +22,14 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 class Contradiction(InputError):
-    """Keys that are valid each by itself and cannot stand together: a step that does not divide the run."""
+    """Keys that are valid each by itself and cannot stand together: a step that does not divide the run.
+
+    `problem` is the message without the file in front of it.
+    """
+
+    def __init__(self, message: str, problem: str) -> None:
+        super().__init__(message)
+        self.problem = problem
 
 
 def load_scenario(path: Path, assignments: Sequence[str] = ()) -> Scenario:
@@ -92,7 +99,10 @@ def validated(content: Mapping[str, Any], model: type[_Model], origin: str) -> _
     if len(problems) > _MOST_PROBLEMS:
         problems[_MOST_PROBLEMS:] = [f"and {len(problems) - _MOST_PROBLEMS} more problems"]
     together = all(problem["type"] == "value_error" and isinstance(problem["input"], Mapping) for problem in errors)
-    raise (Contradiction if together else InputError)(f"{origin}: " + f"\n{origin}: ".join(problems))
+    message = f"{origin}: " + f"\n{origin}: ".join(problems)
+    if together:
+        raise Contradiction(message, "; ".join(problems))
+    raise InputError(message)
 
 
 def _read(path: Path, kind: str) -> Any:

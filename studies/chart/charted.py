@@ -77,8 +77,8 @@ def _chosen(plan: Plan, reference: StoredRun) -> list[Measure]:
     for name in plan.study.measures or ():
         if name not in known:
             raise InputError(
-                f"{plan.origin}: measures: the scenario has no '{name}'{did_you_mean(name, known)}; remove it, or let "
-                "the scenario record it"
+                f"{plan.origin}: measures: the scenario has no '{name}', or it never changes"
+                f"{did_you_mean(name, known)}; name a quantity that the scenario records and that moves"
             )
     if not known:
         raise InputError(f"{plan.origin}: the scenario records nothing to measure; see `output` in the scenario")
