@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import build_body
 import pytest
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.mesh.file import read_mesh
@@ -50,3 +51,18 @@ def small_scenario(tmp_path: Path, small_heart_file: Path) -> Path:
     path = tmp_path / "small.yaml"
     path.write_text(_SCENARIO.replace("MESH", str(small_heart_file)))
     return path
+
+
+@pytest.fixture(scope="session")
+def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The two-mass oscillator's FMUs in C, sound and with one quirk each."""
+    folder = tmp_path_factory.mktemp("bodies")
+    return {
+        "whole": build_body.build_body(folder / "whole.fmu"),
+        "stateless": build_body.build_body(folder / "stateless.fmu", state=False),
+        "equal": build_body.build_body(folder / "equal.fmu", variable_step=False),
+        "holding": build_body.build_body(folder / "holding.fmu", ramps=False),
+    } | {
+        quirk.lower(): build_body.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
+        for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES", "LEAVES", "BREAKS")
+    }

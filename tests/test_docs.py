@@ -5,7 +5,9 @@ import shlex
 import sys
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
+import pytest
 from cardiac_cosim.orchestrator.scenario import load_scenario
 
 _ROOT = Path(__file__).parent.parent
@@ -75,3 +77,19 @@ def test_every_scenario_is_valid() -> None:
 
 def test_supported_python_is_the_one_that_runs() -> None:
     assert (3, 11) <= sys.version_info[:2] <= (3, 13)
+
+
+def test_the_example_for_python_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "scenarios").symlink_to(_ROOT / "scenarios")
+    monkeypatch.chdir(tmp_path)
+    text = (_ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    blocks = [block.split("```")[0] for block in text.split("```python\n")[1:]]
+    assert len(blocks) == 4
+    names: dict[str, Any] = {}
+    # The last one, a study, takes longer than all others; it is run for a part of its time.
+    for block in blocks:
+        exec(block.replace('["run.participants=native"]', '["run.participants=native", "run.stop_ms=40"]'), names)
+    assert names["run"].summary["activation_time_ms"]["near"] > 10.0
+    assert len(names["series"]) == 61
+    assert names["potential"].shape == (len(names["run"].points_mm),)
+    assert (tmp_path / "results" / "strand_coupling" / "chart.csv").is_file()

@@ -55,7 +55,7 @@ def _content(out: Path) -> dict[str, Any]:
 def test_killed_at_any_moment_and_resumed_it_is_the_run_that_was_never_killed(
     participants: str, coupling: str, small_scenario: Path, tmp_path: Path
 ) -> None:
-    sets = (coupling, f"run.participants={participants}", "run.stop_ms=40", "run.checkpoint_every=4")
+    sets = (coupling, f"run.participants={participants}", "run.stop_ms=80", "run.checkpoint_every=4")
     _run(small_scenario, tmp_path / "whole", *sets)
     out = tmp_path / "killed"
     chance = random.Random(f"{participants} {coupling}")
@@ -68,7 +68,7 @@ def test_killed_at_any_moment_and_resumed_it_is_the_run_that_was_never_killed(
         # Once the run has gone on from where it was, at a random moment of the next few steps.
         while process.poll() is None and _rows(out) in (0, rows) and time.monotonic() - begin < 60.0:
             time.sleep(0.005)
-        time.sleep(chance.uniform(0.0, 0.1))
+        time.sleep(chance.uniform(0.0, 0.06))
         process.kill()
         process.communicate()
         deaths += process.returncode == -signal.SIGKILL

@@ -36,20 +36,6 @@ output: {every_ms: 2000}
 _MASSES = Oscillator()
 
 
-@pytest.fixture(scope="session")
-def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("bodies")
-    return {
-        "whole": build_body.build_body(folder / "whole.fmu"),
-        "stateless": build_body.build_body(folder / "stateless.fmu", state=False),
-        "equal": build_body.build_body(folder / "equal.fmu", variable_step=False),
-        "holding": build_body.build_body(folder / "holding.fmu", ramps=False),
-    } | {
-        quirk.lower(): build_body.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
-        for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES", "LEAVES", "BREAKS")
-    }
-
-
 @pytest.fixture
 def simulate(tmp_path: Path, bodies: dict[str, Path]) -> Callable[..., tuple[np.ndarray, Path]]:
     """Run the oscillator out of two FMUs; the time series and the folder."""
