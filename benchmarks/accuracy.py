@@ -4,8 +4,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from cardiac_cosim.orchestrator.run import run_scenario
-from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.orchestrator.simulation import simulate
 
 from .page import README, write_between
 
@@ -17,17 +16,15 @@ _ACTIVATION = {"base": 4.91, "middle": 68.52, "apex": 102.83}
 
 def measure() -> str:
     """The table: reference, ours, largest difference."""
-    scenario = load_scenario(
-        _ROOT / "scenarios" / "baseline.yaml", ["scene={mesh: reference_5mm.msh}", "run.participants=native"]
-    )
+    settings = {"scene": {"mesh": str(_DATA / "reference_5mm.msh")}, "run.participants": "native"}
     with TemporaryDirectory() as folder:
-        summary = run_scenario(scenario, _DATA, Path(folder)).summary
-        found = np.genfromtxt(Path(folder) / "timeseries.csv", delimiter=",", names=True)
+        run = simulate(_ROOT / "scenarios" / "baseline.yaml", settings, folder)
+        found, activation = run.columns, run.summary["activation_time_ms"]
     expected = np.genfromtxt(_DATA / "reference_5mm.csv", delimiter=",", names=True)
     at = np.searchsorted(found["time_ms"], expected["time_ms"])
     rows = ["| | reference | here | |", "|---|---|---|---|"]
     for probe, time in _ACTIVATION.items():
-        ours = summary["activation_time_ms"][probe]
+        ours = activation[probe]
         rows.append(f"| activation, {probe} | {time:.1f} ms | {ours:.1f} ms | {ours - time:+.1f} ms |")
     for column, label, unit in (
         ("lv_volume_ml", "left ventricle, smallest volume", "ml"),

@@ -7,13 +7,14 @@ history.json, with machine and versions.
 
 import argparse
 import json
-import platform
 import subprocess
 import sys
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from cardiac_cosim.studies.machine import machine
 
 from ..page import write_between
 from .figure import draw
@@ -34,19 +35,15 @@ def _measured(*arguments: object) -> dict[str, Any]:
 
 
 def _machine() -> dict[str, Any]:
-    cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    models = [line.split(":", 1)[1].strip() for line in cpuinfo if line.startswith("model name")]
+    """What the tables name of the machine, and the packages that decide the speed."""
     versions = {}
     for package in ("numpy", "scipy", "rslab"):
         try:
             versions[package] = version(package)
         except PackageNotFoundError:
             versions[package] = "not installed"
-    return {
-        "processor": f"{models[0]}, {len(models)} threads" if models else platform.machine(),
-        "python": platform.python_version(),
-        **versions,
-    }
+    here = machine()
+    return {"processor": f"{here['processor']}, {here['cores']} threads", "python": here["python"], **versions}
 
 
 def _measure(sizes: list[float]) -> list[dict[str, Any]]:

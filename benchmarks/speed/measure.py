@@ -16,8 +16,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from cardiac_cosim.orchestrator.run import run_scenario
-from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.orchestrator.simulation import simulate
 from cardiac_cosim.units.electrophysiology import Electrophysiology
 from cardiac_cosim.units.geometry.registry import build
 from cardiac_cosim.units.mesh import Mesh
@@ -30,11 +29,10 @@ _SCENARIO = Path(__file__).parent.parent.parent / "scenarios" / "baseline.yaml"
 
 def heartbeat(size_mm: float, participants: str, stop_ms: float) -> dict[str, Any]:
     """The baseline on a mesh of `size_mm`, results written, figures apart; then its unit of time."""
-    changes = [f"scene.mesh_size_mm={size_mm}", f"run.participants={participants}", f"run.stop_ms={stop_ms}"]
-    scenario = load_scenario(_SCENARIO, changes)
+    settings = {"scene.mesh_size_mm": size_mm, "run.participants": participants, "run.stop_ms": stop_ms}
     with TemporaryDirectory() as folder:
         begin = perf_counter()
-        summary = run_scenario(scenario, _SCENARIO.parent, Path(folder)).summary
+        summary = simulate(_SCENARIO, settings, folder).summary
         whole = perf_counter() - begin
     wall, peak = summary["wall_s"], _peak_megabytes()
     mesh = build("biventricle", size_mm)
