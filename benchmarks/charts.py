@@ -1,4 +1,4 @@
-"""The charts of scenarios/studies in the documentation (a quarter of an hour; `python -m benchmarks.charts NAME` for one).
+"""The charts of scenarios/studies in the documentation: a quarter of an hour; or `python -m benchmarks.charts NAME`.
 
 Runs what is missing of each study in results/<name>, copies the figure to docs/images/charts, and writes the tables of
 the pages. Run it on a machine that does nothing else.

@@ -34,7 +34,9 @@ print(course["mechanics.lv_volume"][-1])
 @pytest.fixture(scope="module")
 def volume(workshop: Any) -> float:
     """The left ventricle's after a Jacobi run of our own; its FMUs are in the workshop then."""
-    sets = ["coupling.scheme=jacobi", f"run.stop_ms={_STEPS}", f"output.every_ms={_STEPS}"]
+    # As other masters do it: all at the same time, with inputs that are held.
+    held = ["coupling.scheme=jacobi", "coupling.interpolation=hold", "coupling.extrapolation=0"]
+    sets = [*held, f"run.stop_ms={_STEPS}", f"output.every_ms={_STEPS}"]
     options = [word for value in sets for word in ("--set", value)]
     cosim = str(Path(sys.executable).with_name("cosim"))
     native = ["--participants", "native", "--no-figures", "--output", "own"]
