@@ -1,4 +1,4 @@
-"""A chart as a figure: error against cost, a row for each measure, over seconds on the left and over solves beside it."""
+"""A chart as a figure: error against cost, a row for each measure, over seconds and, beside that, over solves."""
 
 import io
 from collections.abc import Sequence

@@ -13,12 +13,15 @@ from .labels import SIZE as LABEL_SIZE
 from .lettering import broken, name_lines, plain, width_in
 from .model import Chart
 from .panel import Panel, is_sweep
-from .style import style_of
+from .style import Style, style_of
 
 _SIZE, _SMALL, _LINE_IN = 9.5, 8.5, 0.165
 
 #: Inches of a sample's line, of a sample with the space beside it, and between entries.
 _STROKE_IN, _SAMPLE_IN, _GAP_IN = 0.32, 0.38, 0.22
+
+#: Of no line in particular.
+_ANY = Style("0.3", "o", "circle", ())
 
 Sample = Callable[[Axes, float, float], None]
 
@@ -65,8 +68,8 @@ def sign_entries(chart: Chart, panels: Sequence[Panel], longest_in: float) -> li
     spots = [spot for panel in panels for line in panel.spots for spot in line]
     same = _same_varied(chart)
     found: list[tuple[Sample, str]] = [
-        (_sample(**marker(style_of(0), True)), "on the front (no point is cheaper and as accurate)"),
-        (_sample(**marker(style_of(0), False)), "dominated"),
+        (_sample(**marker(_ANY, True)), "on the front (no point is cheaper and as accurate)"),
+        (_sample(**marker(_ANY, False)), "dominated"),
         (_stroke(**FRONT), "front"),
     ]
     if any(panel.view.extent(spot.row) for panel in panels for line in panel.spots for spot in line):

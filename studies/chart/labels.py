@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -90,7 +91,7 @@ def _around(places: Boxes, half: float) -> Boxes:
 def _between(corners: Boxes) -> Boxes:
     """Places along a line through `corners`, closer to each other than a label is high."""
     pieces = [corners[:1]]
-    for begin, end in zip(corners[:-1], corners[1:], strict=True):
+    for begin, end in pairwise(corners):
         count = int(np.clip(np.hypot(*(end - begin)) / 3.0, 1, 400)) + 1
         pieces.append(begin + (end - begin) * np.linspace(0.0, 1.0, count)[:, None])
     return np.concatenate(pieces)
