@@ -1,6 +1,9 @@
 """What is said around the pictures of a chart: where its numbers are from."""
 
+from math import isinf
+
 from .model import WALL, Chart
+from .panel import Panel
 
 #: What is said of the entries that a machine has; of others their own name.
 _MACHINE = {
@@ -13,7 +16,7 @@ _MACHINE = {
 
 _COSTS = {
     True: "Seconds are of the wall clock; each point ran alone on its core.",
-    False: "Seconds are of the processor, for points ran beside others.",
+    False: "Seconds are of processor time, because points ran beside others.",
 }
 
 
@@ -24,6 +27,17 @@ def reference_text(chart: Chart) -> str:
     for other in others:
         text += f" Its own uncertainty is its difference from a second reference ({other})."
     return text
+
+
+def uncertainty_text(panel: Panel) -> str:
+    """The uncertainty of the reference in the unit of the panel's measure."""
+    value = panel.uncertainty
+    if value is None:
+        return "unknown"
+    if isinf(value):
+        return "infinite"
+    text = f"{value:.2g} {panel.measure.unit}".rstrip()
+    return f"{text}, below these axes" if value <= panel.errors[0] else text
 
 
 def cost_text(chart: Chart) -> str:

@@ -26,6 +26,9 @@ _WIDTH, _MARGIN = 10.0, 0.12
 _LEFT, _GAP, _PANEL, _HEIGHT, _BELOW = 0.95, 0.2, 3.1, 2.75, 0.55
 _LEGEND = _WIDTH - _LEFT - 2 * _PANEL - 2 * _GAP - _MARGIN
 
+#: A legend that is higher than this stands below the panels, in columns, and the panels are as wide as the sheet.
+_HIGHEST, _COLUMNS = 4.2, 4
+
 _TITLE_SIZE, _LABEL_SIZE, _TEXT_SIZE, _LINE_IN = 13.0, 10.0, 9.0, 0.16
 
 #: Footnotes that a figure has room for.
@@ -79,42 +82,60 @@ def write_figures(chart: Chart, folder: Path) -> list[Path]:
 
 
 class _Row:
-    """The panels of one measure, and their legend."""
+    """The panels of one measure, and their legend beside or below them."""
 
     def __init__(self, chart: Chart, panels: Sequence[Panel]) -> None:
         self.panels = panels
-        self._entries: list[Entry] = line_entries(chart, panels[0], _LEGEND)
-        strips = max(strip_rows(len(without_cost(each)), _PANEL) for each in panels)
+        entries = line_entries(chart, panels[0], _LEGEND)
+        beside = _height_in(entries)
+        self._is_beside = beside <= _HIGHEST
+        if self._is_beside:
+            self._columns, self._column = [entries], _LEGEND
+            self._width = _PANEL
+        else:
+            self._column = (_WIDTH - _LEFT - _MARGIN) / _COLUMNS
+            entries = line_entries(chart, panels[0], self._column)
+            count = -(-len(entries) // _COLUMNS)
+            self._columns = [entries[begin : begin + count] for begin in range(0, len(entries), count)]
+            self._width = 0.5 * (_WIDTH - _LEFT - _GAP - 2 * _MARGIN)
+        strips = max(strip_rows(len(without_cost(each)), self._width) for each in panels)
         self._above = STRIP_ROW_IN * (strips + any(map(has_arrows, panels))) + 0.12
-        legend = sum(entry.height_in for entry in self._entries)
-        self._panel = max(_HEIGHT, legend - _BELOW)
-        self.height = self._above + self._panel + _BELOW
+        self._panel = max(_HEIGHT, beside - _BELOW) if self._is_beside else _HEIGHT * self._width / _PANEL
+        self._legend = self._panel + _BELOW if self._is_beside else max(map(_height_in, self._columns)) + 0.1
+        self.height = self._above + self._panel + _BELOW + (0.0 if self._is_beside else self._legend)
 
     def draw(self, figure: Figure, top: float, chart: Chart, notes: Footnotes) -> None:
         """Draw it from `top`, in inches above the lower edge of the sheet."""
         bottom = top - self._above - self._panel
         for number, each in enumerate(self.panels):
-            left = _LEFT + number * (_PANEL + _GAP)
-            axis = figure.add_axes(_fractions(figure, (left, bottom, _PANEL, self._panel)))
+            left = _LEFT + number * (self._width + _GAP)
+            axis = figure.add_axes(_fractions(figure, (left, bottom, self._width, self._panel)))
             draw_panel(axis, each, chart.lines, notes)
             if number:
                 axis.tick_params(axis="y", which="both", labelleft=False)
             else:
                 axis.set_ylabel("\n".join(map(plain, self._label(each))), fontsize=_LABEL_SIZE)
                 # All rows have it at the same place, and none beyond the sheet.
-                axis.yaxis.set_label_coords((0.22 - left) / _PANEL, 0.5)
+                axis.yaxis.set_label_coords((0.22 - left) / self._width, 0.5)
                 axis.yaxis.label.set_verticalalignment("center")
-        legend = _inches(figure, (_WIDTH - _LEGEND - _MARGIN, bottom - _BELOW, _LEGEND, self._panel + _BELOW))
-        draw_column(legend, self._entries, self._panel + _BELOW)
+        left = _WIDTH - _LEGEND - _MARGIN if self._is_beside else _LEFT
+        legend_bottom = bottom - _BELOW - (0.0 if self._is_beside else self._legend)
+        for number, entries in enumerate(self._columns):
+            place = (left + number * self._column, legend_bottom, self._column, self._legend)
+            draw_column(_inches(figure, place), entries, self._legend)
 
     def _label(self, each: Panel) -> list[str]:
         unit = f" ({each.measure.unit})" if each.measure.unit else ""
         return broken(f"{each.measure.description}{unit}", _LABEL_SIZE, self._panel)
 
 
+def _height_in(entries: Sequence[Entry]) -> float:
+    return sum(entry.height_in for entry in entries)
+
+
 def _below(chart: Chart, notes: Footnotes, width: float) -> list[str]:
     """Lines of text under the panels."""
-    texts = [f"{number}  {text}" for number, text in enumerate(notes.texts, start=1)]
+    texts = [f"{number}: {text}" for number, text in enumerate(notes.texts, start=1)]
     if len(texts) > _MOST_NOTES:
         left_out = len(texts) - _MOST_NOTES
         texts = [*texts[:_MOST_NOTES], f"{left_out} more reasons stand in chart.html and chart.csv."]

@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
+from .caption import uncertainty_text
 from .drawing import BAND, CROSS, FRONT, INFINITE, ZERO, line_style, marker, without_cost
 from .labels import SIZE as LABEL_SIZE
 from .lettering import broken, name_lines, plain, width_in
@@ -51,14 +52,12 @@ def line_entries(chart: Chart, panel: Panel, width_in: float) -> list[Entry]:
         if order is not None:
             small.append(f"order {order:.1f}")
         if not is_sweep(line) and len(line.rows) > 1:
-            small += broken("connected: the best of its points", _SMALL, room)
+            small += broken("line through its best points", _SMALL, room)
         if same is None and line.varied:
             small += broken(f"at the points: {', '.join(line.varied)}", _SMALL, room)
         entries.append(Entry(_line_sample(number), name_lines(line.name, _SIZE, room), small))
     if panel.uncertainty is not None:
-        text = f"uncertainty of the reference: {panel.uncertainty:.2g} {panel.measure.unit}".rstrip()
-        if panel.uncertainty <= panel.errors[0]:
-            text += ", below these axes"
+        text = f"uncertainty of the reference: {uncertainty_text(panel)}"
         entries.append(Entry(_band_sample, broken(text, _SIZE, room), []))
     return entries
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from plotly.graph_objects import Figure
 
+from .caption import uncertainty_text
 from .model import Chart, ChartLine
 from .panel import Panel, Spot, is_sweep, panel, path, views
 from .style import Style, style_of
@@ -135,7 +136,7 @@ def _traces(chart: Chart, each: Panel, where: _Places) -> list[dict[str, Any]]:
             "x": across,
             "y": up,
             "mode": "lines",
-            "line": {"color": "#d0d0d0", "width": 6},
+            "line": {"color": "#d0d0d0", "width": 6, "simplify": False},
             "name": "front",
             "hoverinfo": "skip",
             "legend": where.legend,
@@ -161,7 +162,7 @@ def _line_traces(number: int, line: ChartLine, each: Panel, where: _Places) -> l
     if order is not None:
         name += f"<br>order {order:.1f}"
     elif not is_sweep(line) and len(line.rows) > 1:
-        name += "<br>connected: the best of its points"
+        name += "<br>line through its best points"
     traces: list[dict[str, Any]] = []
     # A line of which nothing is done is in the legend all the same.
     for spots, mode in ((connected, "lines+markers"), (others, "markers")):
@@ -334,9 +335,7 @@ def _uncertainty(each: Panel, where: _Places) -> list[dict[str, Any]]:
     if each.uncertainty is None:
         return []
     low, high = each.errors
-    text = f"uncertainty of the reference:<br>{each.uncertainty:.2g} {safe(each.measure.unit)}".rstrip()
-    if each.uncertainty <= low:
-        text += ", below these axes"
+    text = f"uncertainty of the reference:<br>{safe(uncertainty_text(each))}"
     return [
         {
             "type": "rect",
