@@ -22,7 +22,7 @@ _LABELS = {
 _SPREAD = 0.05
 
 #: An axis reaches over this many decades at least, and beyond its points by this part of what it spans.
-_DECADES, _MARGIN = 0.9, 0.06
+_DECADES, _MARGIN = 0.9, 0.09
 
 #: Powers of ten that a number can have.
 _MOST = 307.0

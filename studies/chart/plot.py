@@ -129,8 +129,9 @@ def _axes(each: Panel, where: Places, has_strip: bool) -> dict[str, Any]:
 
 
 def _scale(low: float, high: float) -> dict[str, Any]:
-    decades = log10(high / low)
-    return {"range": [log10(low), log10(high)], "dtick": "D2" if decades < 1.8 else max(round(decades / 6), 1)}
+    first, last = log10(low), log10(high)
+    decades = last - first
+    return {"range": [first, last], "dtick": "D2" if decades < 1.8 else max(round(decades / 6), 1)}
 
 
 def _view_of(panels: Sequence[Panel], places: Sequence[Places]) -> dict[str, Any]:

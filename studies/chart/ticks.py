@@ -19,7 +19,7 @@ def set_ticks(axis: Axis, low: float, high: float) -> None:
     """Put the ticks of a logarithmic axis with these limits."""
     first, last = floor(log10(low)), ceil(log10(high))
     powers = range(first, last + 1)
-    few = log10(high / low) < _FEW
+    few = log10(high) - log10(low) < _FEW
     every = 1 if few else ceil((last - first) / _MOST)
     major = [
         float(f"{base}e{power}") for power in powers if power % every == 0 for base in ((1, 2, 5) if few else (1,))
