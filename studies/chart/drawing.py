@@ -101,6 +101,16 @@ def without_cost(panel: Panel) -> list[tuple[int, Spot]]:
     return [(number, spot) for number, spots in enumerate(panel.spots) for spot in spots if isnan(spot.cost)]
 
 
+def strip_rows(count: int, width_in: float) -> int:
+    """Rows that so many points without a result need above a panel of this width."""
+    return -(-count // _columns(width_in))
+
+
+def has_arrows(panel: Panel) -> bool:
+    """Whether something is written above the upper edge."""
+    return any(not isnan(spot.cost) and not isfinite(spot.error) for spots in panel.spots for spot in spots)
+
+
 # --- inside -----------------------------------------------------------------------------------------------------------
 
 
@@ -156,18 +166,8 @@ def _label(spot: Spot) -> str:
     return text if len(text) <= _LONGEST else ""
 
 
-def strip_rows(count: int, width_in: float) -> int:
-    """Rows that so many points without a result need above a panel of this width."""
-    return -(-count // _columns(width_in))
-
-
 def _columns(width_in: float) -> int:
     return max(int((width_in - STRIP_WORDS_IN) / STRIP_STEP_IN), 1)
-
-
-def has_arrows(panel: Panel) -> bool:
-    """Whether something is written above the upper edge."""
-    return any(not isnan(spot.cost) and not isfinite(spot.error) for spots in panel.spots for spot in spots)
 
 
 def _draw_strip(axis: Axes, panel: Panel, notes: Footnotes) -> None:

@@ -42,7 +42,7 @@ def draw(chart: Chart) -> Figure:
     notes = footnotes(chart)
     rows = [_Row(chart, [panel(chart, measure, view) for view in views(chart)]) for measure in chart.measures]
     width = _WIDTH - 2 * _MARGIN
-    title = broken(shortened(f"{chart.name}: error against cost of {chart.scenario}", _LONGEST), _TITLE_SIZE, width)
+    title = broken(shortened(f"{chart.name}: error against cost, {chart.scenario}", _LONGEST), _TITLE_SIZE, width)
     signs = sign_entries(chart, [each for row in rows for each in row.panels], width)
     words = _below(chart, notes, width)
     head = 0.1 + 0.25 * len(title) + sum(max(entry.height_in for entry in row) for row in signs) + 0.1
@@ -141,7 +141,9 @@ def _below(chart: Chart, notes: Footnotes, width: float) -> list[str]:
         texts = [*texts[:_MOST_NOTES], f"{left_out} more reasons stand in chart.html and chart.csv."]
     caption = [reference_text(chart), cost_text(chart)]
     if any(line.orders for line in chart.lines):
-        caption.append("The order is the observed order of accuracy: the error's power of what varies.")
+        caption.append(
+            "The order is the observed order of accuracy: the power of the varied number by which the error grows."
+        )
     caption += [machine_text(chart), *note_texts(chart)]
     caption = [shortened(text, _LONGEST) for text in caption if text]
     lines = [line for text in texts for line in broken(text, _TEXT_SIZE, width)]

@@ -50,7 +50,7 @@ def line_entries(chart: Chart, panel: Panel, width_in: float) -> list[Entry]:
         small = []
         order = line.orders.get(panel.measure.name)
         if order is not None:
-            small.append(f"order {order:.1f}")
+            small.append(f"order {order:z.1f}")
         if not is_sweep(line) and len(line.rows) > 1:
             small += broken("line through its best points", _SMALL, room)
         if same is None and line.varied:

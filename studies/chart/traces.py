@@ -44,7 +44,7 @@ def _line_traces(number: int, line: ChartLine, each: Panel, where: Places) -> li
     name = safe_lines(line.name, LETTERS)
     order = line.orders.get(each.measure.name)
     if order is not None:
-        name += f"<br>order {order:.1f}"
+        name += f"<br>order {order:z.1f}"
     elif not is_sweep(line) and len(line.rows) > 1:
         name += "<br>line through its best points"
     traces: list[dict[str, Any]] = []

@@ -94,8 +94,14 @@ def test_names_and_orders_stand_beside_every_measure() -> None:
     orders = [order for line in chart.lines for order in line.orders.values()]
     assert len(orders) > 10
     for order in orders:
-        assert f"order {order:.1f}" in words
+        assert f"order {order:z.1f}" in words
     assert words.count("order ") >= len(orders)
+
+
+def test_an_order_of_nearly_zero_has_no_sign() -> None:
+    chart = _one({"flat": _sweep({1.0: 0.1, 2.0: 0.0999, 5.0: 0.0998})})
+    assert -0.05 < chart.lines[0].orders[_ACTIVATION.name] < 0.0
+    assert "order 0.0" in _words(draw(chart))
 
 
 def test_the_axes_say_what_they_are_and_in_which_unit() -> None:

@@ -163,7 +163,7 @@ def test_orders_uncertainty_and_units_are_told() -> None:
             ]
             assert len(names) == 1
             order = line.orders.get(measure.name)
-            assert names[0].endswith(f"order {order:.1f}") if order is not None else "order" not in names[0]
+            assert names[0].endswith(f"order {order:z.1f}") if order is not None else "order" not in names[0]
     shapes = content["layout"]["shapes"]
     assert [shape["y1"] for shape in shapes] == [0.3, 0.004]
     assert [shape["name"].split("<br>")[1] for shape in shapes] == ["0.3 ms", "0.004 ml"]
