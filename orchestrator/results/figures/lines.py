@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 
 from ...participants.participant import Values
 from ..stored_run import StoredRun
+from .colors import COLORS
 
-# Colours that people with any colour vision tell apart (Okabe and Ito), the darker ones first.
-_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 _STYLES = ("-", "--", ":", "-.")
 
 _PROBE = re.compile(r"(?:(?P<unit>.+)\.)?potential_(?P<probe>.+)_mV")
@@ -50,8 +49,8 @@ def _over_time(run: StoredRun, lines: Mapping[str, Values], label: str, legend: 
     figure = Figure(figsize=(10.0, 5.0), layout="constrained")
     axis = figure.subplots()
     for number, (name, values) in enumerate(lines.items()):
-        color = _COLORS[number % len(_COLORS)]
-        style = _STYLES[number // len(_COLORS) % len(_STYLES)]
+        color = COLORS[number % len(COLORS)]
+        style = _STYLES[number // len(COLORS) % len(_STYLES)]
         # A single row makes no line; a dot shows that it is there.
         # Units that step less often leave gaps.
         known = np.isfinite(values)

@@ -4,9 +4,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..stored_run import StoredRun
+from .colors import COLORS
 
 _VOLUME, _PRESSURE = "_volume_ml", "_pressure_kPa"
-_COLORS = ("#0072B2", "#D55E00")
 
 
 def pressure_volume(run: StoredRun) -> Figure | None:
@@ -25,7 +25,7 @@ def pressure_volume(run: StoredRun) -> Figure | None:
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axis = figure.subplots()
     for number, (cavity, (volumes, pressures)) in enumerate(curves.items()):
-        color = _COLORS[number % len(_COLORS)]
+        color = COLORS[number % len(COLORS)]
         axis.plot(volumes, pressures, color=color, linewidth=2.0, label=cavity)
         axis.plot(volumes[0], pressures[0], "o", color=color)
     axis.set_xlabel("cavity volume (ml)", fontsize=12)

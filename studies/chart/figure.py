@@ -1,0 +1,163 @@
+"""A chart as a figure: error against cost, a row for each measure, over seconds and, beside that, over solves."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ...orchestrator.quoting import shortened
+from ...orchestrator.results.whole import write_whole
+from .caption import cost_text, machine_text, note_texts, reference_text
+from .drawing import STRIP_ROW_IN, draw_panel, has_arrows, strip_rows, without_cost
+from .footnotes import Footnotes, footnotes
+from .key import Entry, draw_column, draw_rows, line_entries, sign_entries
+from .lettering import broken, plain
+from .model import Chart
+from .panel import Panel, panel, views
+
+_DOTS_PER_INCH = 160
+
+#: Inches: the sheet; what is left of the panels, between them, and right of them; the panels, with their labels below.
+_WIDTH, _MARGIN = 10.0, 0.12
+_LEFT, _GAP, _PANEL, _HEIGHT, _BELOW = 0.95, 0.2, 3.1, 2.75, 0.55
+_LEGEND = _WIDTH - _LEFT - 2 * _PANEL - 2 * _GAP - _MARGIN
+
+#: A legend that is higher than this stands below the panels, in columns, and the panels are as wide as the sheet.
+_HIGHEST, _COLUMNS = 4.2, 4
+
+_TITLE_SIZE, _LABEL_SIZE, _TEXT_SIZE, _LINE_IN = 13.0, 10.0, 9.0, 0.16
+
+#: Footnotes that a figure has room for.
+_MOST_NOTES = 15
+
+_LONGEST = 600
+
+
+def draw(chart: Chart) -> Figure:
+    """The whole chart on one sheet."""
+    notes = footnotes(chart)
+    rows = [_Row(chart, [panel(chart, measure, view) for view in views(chart)]) for measure in chart.measures]
+    width = _WIDTH - 2 * _MARGIN
+    title = broken(shortened(f"{chart.name}: error against cost, {chart.scenario}", _LONGEST), _TITLE_SIZE, width)
+    signs = sign_entries(chart, [each for row in rows for each in row.panels], width)
+    words = _below(chart, notes, width)
+    head = 0.1 + 0.25 * len(title) + sum(max(entry.height_in for entry in row) for row in signs) + 0.1
+    foot = _LINE_IN * len(words) + 0.15
+    height = head + sum(row.height for row in rows) + foot
+    figure = Figure(figsize=(_WIDTH, height), dpi=_DOTS_PER_INCH)
+    sheet = _inches(figure, (0.0, 0.0, _WIDTH, height))
+    for number, line in enumerate(title):
+        sheet.text(_MARGIN, height - 0.1 - 0.25 * number, plain(line), fontsize=_TITLE_SIZE, weight="bold", va="top")
+    key = _inches(figure, (_MARGIN, 0.0, width, height))
+    draw_rows(key, signs, height - 0.1 - 0.25 * len(title) - 0.04)
+    top = height - head
+    for row in rows:
+        row.draw(figure, top, chart, notes)
+        top -= row.height
+    for number, line in enumerate(words):
+        sheet.text(_MARGIN, foot - 0.05 - _LINE_IN * number, plain(line), fontsize=_TEXT_SIZE, va="top", color="0.2")
+    return figure
+
+
+def write_figures(chart: Chart, folder: Path) -> list[Path]:
+    """Write `chart.png` and `chart.svg` into `folder`; returns the files."""
+    figure = draw(chart)
+    FigureCanvasAgg(figure)
+    written = []
+    # The same chart gives the same file.
+    with rc_context({"svg.hashsalt": "cardiac-cosim"}):
+        for kind, metadata in (("png", {}), ("svg", {"Date": None})):
+            content = io.BytesIO()
+            figure.savefig(content, format=kind, dpi=_DOTS_PER_INCH, metadata=metadata)
+            written.append(folder / f"chart.{kind}")
+            write_whole(written[-1], content.getvalue())
+    return written
+
+
+# --- inside -----------------------------------------------------------------------------------------------------------
+
+
+class _Row:
+    """The panels of one measure, and their legend beside or below them."""
+
+    def __init__(self, chart: Chart, panels: Sequence[Panel]) -> None:
+        self.panels = panels
+        entries = line_entries(chart, panels[0], _LEGEND)
+        beside = _height_in(entries)
+        self._is_beside = beside <= _HIGHEST
+        if self._is_beside:
+            self._columns, self._column = [entries], _LEGEND
+            self._width = _PANEL
+        else:
+            self._column = (_WIDTH - _LEFT - _MARGIN) / _COLUMNS
+            entries = line_entries(chart, panels[0], self._column)
+            count = -(-len(entries) // _COLUMNS)
+            self._columns = [entries[begin : begin + count] for begin in range(0, len(entries), count)]
+            self._width = 0.5 * (_WIDTH - _LEFT - _GAP - 2 * _MARGIN)
+        strips = max(strip_rows(len(without_cost(each)), self._width) for each in panels)
+        self._above = STRIP_ROW_IN * (strips + any(map(has_arrows, panels))) + 0.12
+        self._panel = max(_HEIGHT, beside - _BELOW) if self._is_beside else _HEIGHT * self._width / _PANEL
+        self._legend = self._panel + _BELOW if self._is_beside else max(map(_height_in, self._columns)) + 0.1
+        self.height = self._above + self._panel + _BELOW + (0.0 if self._is_beside else self._legend)
+
+    def draw(self, figure: Figure, top: float, chart: Chart, notes: Footnotes) -> None:
+        """Draw it from `top`, in inches above the lower edge of the sheet."""
+        bottom = top - self._above - self._panel
+        for number, each in enumerate(self.panels):
+            left = _LEFT + number * (self._width + _GAP)
+            axis = figure.add_axes(_fractions(figure, (left, bottom, self._width, self._panel)))
+            draw_panel(axis, each, chart.lines, notes)
+            if number:
+                axis.tick_params(axis="y", which="both", labelleft=False)
+            else:
+                axis.set_ylabel("\n".join(map(plain, self._label(each))), fontsize=_LABEL_SIZE)
+                # All rows have it at the same place, and none beyond the sheet.
+                axis.yaxis.set_label_coords((0.22 - left) / self._width, 0.5)
+                axis.yaxis.label.set_verticalalignment("center")
+        left = _WIDTH - _LEGEND - _MARGIN if self._is_beside else _LEFT
+        legend_bottom = bottom - _BELOW - (0.0 if self._is_beside else self._legend)
+        for number, entries in enumerate(self._columns):
+            place = (left + number * self._column, legend_bottom, self._column, self._legend)
+            draw_column(_inches(figure, place), entries, self._legend)
+
+    def _label(self, each: Panel) -> list[str]:
+        unit = f" ({each.measure.unit})" if each.measure.unit else ""
+        return broken(f"{each.measure.description}{unit}", _LABEL_SIZE, self._panel)
+
+
+def _height_in(entries: Sequence[Entry]) -> float:
+    return sum(entry.height_in for entry in entries)
+
+
+def _below(chart: Chart, notes: Footnotes, width: float) -> list[str]:
+    """Lines of text under the panels."""
+    texts = [f"{number}: {text}" for number, text in enumerate(notes.texts, start=1)]
+    if len(texts) > _MOST_NOTES:
+        left_out = len(texts) - _MOST_NOTES
+        texts = [*texts[:_MOST_NOTES], f"{left_out} more reasons stand in chart.html and chart.csv."]
+    caption = [reference_text(chart), cost_text(chart)]
+    if any(line.orders for line in chart.lines):
+        caption.append(
+            "The order is the observed order of accuracy: the power of the varied number by which the error grows."
+        )
+    caption += [machine_text(chart), *note_texts(chart)]
+    caption = [shortened(text, _LONGEST) for text in caption if text]
+    lines = [line for text in texts for line in broken(text, _TEXT_SIZE, width)]
+    return [*lines, *[""] * bool(lines), *broken(" ".join(caption), _TEXT_SIZE, width)]
+
+
+def _inches(figure: Figure, place: tuple[float, float, float, float]) -> Axes:
+    """Axes without a frame whose unit is an inch, at left, bottom, width and height."""
+    axis = figure.add_axes(_fractions(figure, place))
+    axis.set(xlim=(0.0, place[2]), ylim=(0.0, place[3]))
+    axis.set_axis_off()
+    return axis
+
+
+def _fractions(figure: Figure, place: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    width, height = figure.get_size_inches()
+    return place[0] / width, place[1] / height, place[2] / width, place[3] / height
