@@ -1,6 +1,7 @@
 """Deformation at the integration points, and the Voigt notation that the passive laws share."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -10,10 +11,14 @@ from ..arrays import FloatArray
 VOIGT_ROWS = (0, 1, 2, 0, 1, 0)
 VOIGT_COLUMNS = (0, 1, 2, 1, 2, 2)
 
+#: As indices of arrays, and those of two pairs; made once, for single elements are evaluated a thousand times.
+_ROWS, _COLUMNS = np.array(VOIGT_ROWS), np.array(VOIGT_COLUMNS)
+_I, _J, _K, _M = _ROWS[:, None], _COLUMNS[:, None], _ROWS[None], _COLUMNS[None]
+
 
 def voigt(tensor: FloatArray) -> FloatArray:
     """Six components of symmetric tensors, shape (elements, 3, 3) to (elements, 6); shears once, as for stresses."""
-    return tensor[:, VOIGT_ROWS, VOIGT_COLUMNS]
+    return tensor[:, _ROWS, _COLUMNS]
 
 
 def dyad(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -23,9 +28,7 @@ def dyad(left: FloatArray, right: FloatArray) -> FloatArray:
 
 def symmetric_product(tensor: FloatArray) -> FloatArray:
     """(X⊙X)_ijkl = ½(X_ik X_jl + X_il X_jk) of symmetric X, shape (elements, 3, 3) to (elements, 6, 6)."""
-    rows, columns = np.array(VOIGT_ROWS), np.array(VOIGT_COLUMNS)
-    i, j, k, m = rows[:, None], columns[:, None], rows[None], columns[None]
-    return 0.5 * (tensor[:, i, k] * tensor[:, j, m] + tensor[:, i, m] * tensor[:, j, k])
+    return 0.5 * (tensor[:, _I, _K] * tensor[:, _J, _M] + tensor[:, _I, _M] * tensor[:, _J, _K])
 
 
 def cofactors(tensor: FloatArray) -> FloatArray:
@@ -45,7 +48,7 @@ class Kinematics:
 
     `cauchy_green` C and its `inverse` have shape (points, 3, 3), `log_volume` ln J has shape (points,); `structure` is
     a₀⊗a₀ of the fibre and `sheet_structure` s₀⊗s₀ of the sheet, both of shape (points, 3, 3). J is positive: whoever
-    builds this has checked.
+    builds this has checked. What several laws need of it is computed once.
     """
 
     cauchy_green: FloatArray
@@ -63,10 +66,25 @@ class Kinematics:
         inverse = cofactors(cauchy_green) / (volume_ratio**2)[:, None, None]
         return cls(cauchy_green, inverse, np.log(volume_ratio), structure, sheet_structure)
 
-    @property
+    @cached_property
     def fiber_stretch_squared(self) -> FloatArray:
         """I_a = a₀·C a₀, shape (elements,)."""
         return np.asarray(np.einsum("eij,eij->e", self.structure, self.cauchy_green))
+
+    @cached_property
+    def isochoric(self) -> FloatArray:
+        """J^(−2/3), shape (elements,)."""
+        return np.asarray(np.exp(-2.0 / 3.0 * self.log_volume))
+
+    @cached_property
+    def inverse_components(self) -> FloatArray:
+        """C⁻¹ in Voigt notation, shape (elements, 6)."""
+        return voigt(self.inverse)
+
+    @cached_property
+    def inverse_product(self) -> FloatArray:
+        """C⁻¹⊙C⁻¹, shape (elements, 6, 6)."""
+        return symmetric_product(self.inverse)
 
 
 def square(direction: FloatArray) -> FloatArray:

@@ -107,10 +107,10 @@ class LocalMechanics(Unit):
             at = self._at(squares)
             with np.errstate(over="ignore", invalid="ignore"):
                 stress = sum(law.stress(at) for law in self._laws)
+                residual = np.einsum("eii->ei", stress) + tension[:, None] * self._shares
+                if np.abs(residual[:, free]).max() <= _TOLERANCE * modulus:
+                    return squares
                 tangent = 0.5 * np.asarray(sum(law.tangent(at)[:, free, free] for law in self._laws))
-            residual = np.einsum("eii->ei", stress) + tension[:, None] * self._shares
-            if np.abs(residual[:, free]).max() <= _TOLERANCE * modulus:
-                return squares
             # Normal components of the tangent: stress by half the change of the squared stretches.
             # Where the tissue is torn apart its energy overflows, or has no curvature left.
             if not (np.isfinite(tangent).all() and np.isfinite(residual).all()):
@@ -127,7 +127,6 @@ class LocalMechanics(Unit):
     def _at(self, squares: FloatArray) -> Kinematics:
         diagonal = np.zeros((len(squares), 3, 3))
         inverse = np.zeros((len(squares), 3, 3))
-        for axis in range(3):
-            diagonal[:, axis, axis] = squares[:, axis]
-            inverse[:, axis, axis] = 1.0 / squares[:, axis]
+        np.einsum("eii->ei", diagonal)[:] = squares
+        np.einsum("eii->ei", inverse)[:] = 1.0 / squares
         return Kinematics(diagonal, inverse, 0.5 * np.log(squares).sum(axis=1), self._structure, self._sheet_structure)

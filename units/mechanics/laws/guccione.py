@@ -60,7 +60,7 @@ class Guccione:
         """∂²W/∂E² in MPa, Voigt notation, shape (points, 6, 6)."""
         exponent, slope = self._exponent(at)
         on_fiber, on_all, on_shear = self._shares
-        gradient, structure, inverse = voigt(slope), voigt(at.structure), voigt(at.inverse)
+        gradient, structure, inverse = voigt(slope), voigt(at.structure), at.inverse_components
         eye = np.broadcast_to(np.eye(3), slope.shape)
         # A dE + dE A is what the product of 1 + A with itself has beyond those of 1 and of A.
         mixed = symmetric_product(eye + at.structure) - symmetric_product(eye) - symmetric_product(at.structure)
@@ -72,7 +72,7 @@ class Guccione:
         return np.asarray(
             growth[:, None, None] * (dyad(gradient, gradient) + curvature)
             + (self.guccione_bulk_modulus_MPa * squared)[:, None, None] * dyad(inverse, inverse)
-            - (self.guccione_bulk_modulus_MPa * (squared - 1.0))[:, None, None] * symmetric_product(at.inverse)
+            - (self.guccione_bulk_modulus_MPa * (squared - 1.0))[:, None, None] * at.inverse_product
         )
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import FloatArray
 from ...variable import parameter
-from ..kinematics import Kinematics, dyad, symmetric_product, voigt
+from ..kinematics import Kinematics, dyad, voigt
 
 
 @dataclass(frozen=True)
@@ -48,19 +48,18 @@ class HolzapfelFiber:
         """4∂²W_f/∂C² in MPa, Voigt notation, shape (elements, 6, 6)."""
         first, second = self._derivatives(self._extension(at))
         gradient = voigt(self._invariant_gradient(at))
-        structure, inverse = voigt(at.structure), voigt(at.inverse)
+        structure, inverse = voigt(at.structure), at.inverse_components
         squared = at.fiber_stretch_squared[:, None, None]
         curvature = (
             -(dyad(structure, inverse) + dyad(inverse, structure)) / 3.0
             + squared / 9.0 * dyad(inverse, inverse)
-            + squared / 3.0 * symmetric_product(at.inverse)
+            + squared / 3.0 * at.inverse_product
         )
-        isochoric = np.exp(-2.0 / 3.0 * at.log_volume)
-        return 4.0 * (second[:, None, None] * dyad(gradient, gradient) + (first * isochoric)[:, None, None] * curvature)
+        on_curvature = (first * at.isochoric)[:, None, None]
+        return 4.0 * (second[:, None, None] * dyad(gradient, gradient) + on_curvature * curvature)
 
     def _extension(self, at: Kinematics) -> FloatArray:
-        isochoric = np.exp(-2.0 / 3.0 * at.log_volume)
-        return np.maximum(isochoric * at.fiber_stretch_squared - 1.0, 0.0)
+        return np.maximum(at.isochoric * at.fiber_stretch_squared - 1.0, 0.0)
 
     def _derivatives(self, extension: FloatArray) -> tuple[FloatArray, FloatArray]:
         growth = self.fiber_stiffness_MPa * np.exp(self.fiber_exponent * extension**2)
@@ -70,5 +69,6 @@ class HolzapfelFiber:
     @staticmethod
     def _invariant_gradient(at: Kinematics) -> FloatArray:
         """∂Ī_a/∂C, shape (elements, 3, 3)."""
-        isochoric = np.exp(-2.0 / 3.0 * at.log_volume)[:, None, None]
-        return np.asarray(isochoric * (at.structure - at.fiber_stretch_squared[:, None, None] / 3.0 * at.inverse))
+        return np.asarray(
+            at.isochoric[:, None, None] * (at.structure - at.fiber_stretch_squared[:, None, None] / 3.0 * at.inverse)
+        )

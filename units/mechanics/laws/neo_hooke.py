@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import FloatArray
 from ...variable import parameter
-from ..kinematics import Kinematics, dyad, symmetric_product, voigt
+from ..kinematics import Kinematics, dyad
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,6 @@ class NeoHooke:
 
     def tangent(self, at: Kinematics) -> FloatArray:
         """4∂²W/∂C² in MPa, Voigt notation, shape (elements, 6, 6)."""
-        inverse = voigt(at.inverse)
+        inverse = at.inverse_components
         on_product = 2.0 * (self._log_modulus - self.lame_lambda_MPa * at.log_volume)
-        return self.lame_lambda_MPa * dyad(inverse, inverse) + on_product[:, None, None] * symmetric_product(at.inverse)
+        return self.lame_lambda_MPa * dyad(inverse, inverse) + on_product[:, None, None] * at.inverse_product
