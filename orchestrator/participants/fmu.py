@@ -5,9 +5,7 @@ ten times as much. What the two versions of FMI call differently is in `fmi2_cal
 """
 
 import os
-import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -38,6 +36,7 @@ from .fmu_variables import (
 )
 from .participant import Abilities, Implementation, Parameters, Ports, Ramp, Values, Wait
 from .ramping import PendingRamps
+from .unpacked import Unpacked
 
 _FATAL = 4
 
@@ -148,7 +147,7 @@ class FmuParticipant:
         self.name = name
         self._calls: Calls | None = None
         self._initialized = False
-        self._folder: Path | None = None
+        self._unpacked: Unpacked | None = None
         self._only: tuple[str, str] | None = None
         with self._naming(path):
             file = FmuFile(path)
@@ -176,12 +175,13 @@ class FmuParticipant:
             self._log = calls.log
             self._log.instance = name
             self._takes_derivatives = calls.takes_derivatives
+            # Made once a step, for it is shown at every call.
+            self._activity = self._at_work()
             if not loaded:
                 return
             try:
                 self._claim(digest)
-                self._folder = Path(tempfile.mkdtemp(prefix="cosim-fmu-"))
-                file.unpack(self._folder)
+                self._unpacked = Unpacked(file, digest)
                 self._instantiate(calls)
                 self._set_up()
                 self._set_values(variables, parameters, "parameter")
@@ -262,6 +262,7 @@ class FmuParticipant:
 
     def _step(self, time: float, size: float) -> None:
         self._log.time = time
+        self._activity = self._at_work()
         self._call(lambda calls: calls.step(time, size))
 
     def _differentiate(self, name: str, ramp: Ramp, size: float) -> None:
@@ -335,26 +336,27 @@ class FmuParticipant:
     def close(self) -> None:
         """See Participant."""
         calls, self._calls = self._calls, None
+        whole = calls is not None and self._initialized
         if calls is not None:
             # An FMU that failed may refuse to terminate; freeing it is all that is left to do.
             try:
                 if self._initialized:
                     self._do(calls, lambda calls: calls.terminate())
             except ParticipantLost:
-                calls = None
+                calls, whole = None, False
             except ParticipantError:
-                pass
+                whole = False
         if calls is not None:
             self._do(calls, lambda calls: calls.free_instance())
         if self._only is not None:
             _ONLY_ONES.pop(self._only, None)
             self._only = None
         self._log.close()
-        if self._folder is not None:
+        unpacked, self._unpacked = self._unpacked, None
+        if unpacked is not None:
             # An FMU written in Python puts its resources on the path of the process.
-            sys.path[:] = [entry for entry in sys.path if not entry.startswith(str(self._folder))]
-            shutil.rmtree(self._folder, ignore_errors=True)
-            self._folder = None
+            sys.path[:] = [entry for entry in sys.path if not entry.startswith(str(unpacked.folder))]
+            unpacked.give_up(whole)
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
@@ -367,11 +369,14 @@ class FmuParticipant:
             raise ParticipantError(str(self._log))
         return result
 
+    def _at_work(self) -> str:
+        return f"unit '{self.name}' at {self._log.time * _MS_PER_S:.12g} ms"
+
     def _do(self, calls: Calls, call: Callable[[Calls], _Result]) -> _Result:
         """All calls of the FMU go through here."""
         self._log.clear()
         try:
-            with doing(f"unit '{self.name}' at {self._log.time * _MS_PER_S:.12g} ms"):
+            with doing(self._activity):
                 return call(calls)
         except FMICallException as error:
             if error.status == _FATAL:
@@ -402,9 +407,9 @@ class FmuParticipant:
             raise
 
     def _instantiate(self, calls: Calls) -> None:
-        if self._folder is None:
+        if self._unpacked is None:
             raise TypeError("an FMU is extracted before it is instantiated")
-        folder, here = self._folder, Path.cwd()
+        folder, here = self._unpacked.folder, Path.cwd()
         try:
             self._do(calls, lambda calls: calls.instantiate(folder, self.name))
         # FMPy raises plain Exceptions for a missing binary or a failed instantiation.

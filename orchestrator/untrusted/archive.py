@@ -172,7 +172,9 @@ def _place(member: zipfile.ZipInfo) -> str:
         raise InputError(f"its member {quoted(name)} would be written outside of the folder; rename it")
     if "\\" in name:
         raise InputError(f"its member {quoted(name)} is named with backslashes; pack it with forward slashes")
-    if any(unicodedata.category(letter) == "Cc" for letter in name) or not (parts or member.is_dir()):
+    # What can be printed has no control characters; nearly all names can, and each is looked at many times.
+    odd = not name.isprintable() and any(unicodedata.category(letter) == "Cc" for letter in name)
+    if odd or not (parts or member.is_dir()):
         raise InputError(f"its member {quoted(name)} has no name for a file; rename it")
     kind = stat.S_IFMT(member.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
