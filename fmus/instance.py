@@ -171,7 +171,7 @@ class UnitInstance:
     def _whole_run(self, references: np.ndarray) -> Run | None:
         """The run whose value references these are, all of them in their order."""
         key = (int(references[0]), len(references)) if len(references) else None
-        if key not in self._whole or not np.array_equal(references, self._references[key]):
+        if key not in self._whole or not (references == self._references[key]).all():
             return None
         return self._whole[key]
 

@@ -2,9 +2,9 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
+from types import TracebackType
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,7 @@ class Usage:
     apart: bool = False
 
 
-@dataclass(frozen=True)
-class Span:
+class Span(NamedTuple):
     """`label` was busy with `what` from `begin`, a time of the process's clock, for `seconds`."""
 
     label: str
@@ -41,14 +40,9 @@ class Stopwatch:
         self.cpu_apart = 0.0
         self._spans: list[Span] = []
 
-    @contextmanager
-    def measure(self, label: str, what: str) -> Iterator[None]:
+    def measure(self, label: str, what: str) -> "Measured":
         """Add the time of the `with` block to `label`."""
-        begin = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.add(label, what, begin, time.perf_counter() - begin)
+        return Measured(self, label, what)
 
     def add(self, label: str, what: str, begin: float, seconds: float) -> None:
         """Add a span that was measured elsewhere."""
@@ -66,6 +60,23 @@ class Stopwatch:
         spans = tuple(self._spans)
         self._spans.clear()
         return spans
+
+
+class Measured:
+    """See `Stopwatch.measure`."""
+
+    __slots__ = ("_begin", "_label", "_watch", "_what")
+
+    def __init__(self, watch: Stopwatch, label: str, what: str) -> None:
+        self._watch, self._label, self._what = watch, label, what
+
+    def __enter__(self) -> None:
+        self._begin = time.perf_counter()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._watch.add(self._label, self._what, self._begin, time.perf_counter() - self._begin)
 
 
 def seconds_by_label(spans: tuple[Span, ...]) -> dict[str, float]:

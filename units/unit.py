@@ -340,8 +340,7 @@ class Unit(ABC):
 
     @property
     def _ramps(self) -> bool:
-        declared = any(variable.name == INPUT_INTERPOLATION for variable in self.variables())
-        return declared and self.get(INPUT_INTERPOLATION) == "linear"
+        return INPUT_INTERPOLATION in _declared(type(self)) and self.get(INPUT_INTERPOLATION) == "linear"
 
     def _foresee(self) -> State:
         """The state in which the initialisation would end; kept until something is set."""

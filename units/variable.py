@@ -91,7 +91,10 @@ class Variable:
 
     def shape(self, mesh: Mesh) -> tuple[int, ...]:
         """Array shape on `mesh`: () for a scalar, (places,) or (places, components) for a field."""
-        places = {Location.GLOBAL: (), Location.NODE: (mesh.nodes,), Location.ELEMENT: (mesh.elements,)}[self.location]
+        if self.location is Location.GLOBAL:
+            places: tuple[int, ...] = ()
+        else:
+            places = (mesh.nodes if self.location is Location.NODE else mesh.elements,)
         return places if self.components == 1 else (*places, self.components)
 
     def checked(self, value: Any) -> Scalar:

@@ -38,7 +38,7 @@ class Checkpoint:
 
     def __init__(self, folder: Path, origin: Origin, parts: Mapping[str, Callable[[], Mapping[str, Any]]]) -> None:
         self._path = folder / CHECKPOINT
-        self._origin = origin
+        self._origin = json.dumps(origin.content())
         self._parts = parts
 
     def write(self) -> None:
@@ -48,7 +48,7 @@ class Checkpoint:
 
         def fill(file: h5py.File) -> None:
             file.attrs["format"] = _FORMAT
-            file["origin"] = json.dumps(self._origin.content())
+            file["origin"] = self._origin
             file["index"] = json.dumps(index)
             file["values"] = np.frombuffer(values, np.uint8)
 

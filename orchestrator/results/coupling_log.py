@@ -56,7 +56,8 @@ class CouplingLog:
         if step.number:
             seconds = [step.seconds[unit] for unit in (*self._units, MASTER)]
             # A loop one of whose units did not step in this exchange was none.
-            residuals = [sweeps.residuals.get(name) for name in self._converged]
+            norms = sweeps.residuals
+            residuals = [norms.get(name) for name in self._converged]
             first = [step.time_ms, step.size_ms, sweeps.iterations, *residuals, sweeps.contraction_rate, step.rejected]
             judged = [step.error, int(step.missed)] if self._adaptive else []
             self._table.add([*first, *judged, *seconds])

@@ -73,6 +73,9 @@ class Fields:
             self._fixed = {name: participants[unit].get(port.name) for name, unit, port in fixed}
         # Whether fields.h5 refers to the frames, and to how many fields.xdmf does.
         self._refers = False
+        # What fields.xdmf says of each frame so far, whose changing fields lie at this place.
+        self._place = ""
+        self._grids: list[str] = []
         self._listed = len(self._parts.times)
         if resumed is None:
             with writing(self._path):
@@ -135,24 +138,39 @@ class Fields:
         for name, shape in self._moving():
             whole = (count, *shape)
             data = frames.create_dataset(name, whole, maxshape=(None, *shape), chunks=(1, *shape), dtype="f8")
-            chunked.append((name, whole, data.id))
+            chunked.append((name.encode(), np.empty(shape), data.id, Windows(name, whole)))
         for frame in range(count):
             view = file.create_group(f"views/{frame}")
             with self._parts.open(frame) as part:
-                for name, whole, data in chunked:
-                    chunk = np.empty(whole[1:])
-                    h5d.open(part.id, name.encode()).read(h5s.ALL, h5s.ALL, chunk)
+                for encoded, chunk, data, windows in chunked:
+                    h5d.open(part.id, encoded).read(h5s.ALL, h5s.ALL, chunk)
                     data.write_direct_chunk((frame, *[0] * chunk.ndim), chunk)
-                    _window(view, name, frame, whole)
+                    windows.add(view, frame)
 
     def _moving(self) -> list[tuple[str, tuple[int, ...]]]:
         return [(name, port.shape) for name, _, port in self._named if not port.fixed]
 
     def _write_xdmf(self, place: str) -> None:
-        """Write fields.xdmf, whose changing fields lie at `place`, a format of the frame and the name."""
-        self._listed = len(self._parts.times)
+        """Write fields.xdmf, whose changing fields lie at `place`, a format of the frame and the name.
+
+        Only what it says of frames that are new there is made.
+        """
+        if place != self._place:
+            self._place, self._grids = place, []
+        begun = len(self._grids)
+        self._grids += [self._grid(begun + frame, time) for frame, time in enumerate(self._parts.times[begun:])]
+        self._listed = len(self._grids)
+        lines = ["<?xml version='1.0' encoding='utf-8'?>", '<Xdmf Version="3.0">', "<Domain>"]
+        lines.append('<Grid GridType="Collection" CollectionType="Temporal">')
+        lines += [*self._grids, "</Grid>", "</Domain>", "</Xdmf>", ""]
+        with replacing(self._xdmf) as part:
+            part.write_text("\n".join(lines), encoding="utf-8")
+
+    def _grid(self, frame: int, time: float) -> str:
         mesh = self._mesh
-        head = [
+        lines = [
+            '<Grid Name="mesh">',
+            f'<Time Value="{time!r}" />',
             f'<Topology NumberOfElements="{mesh.elements}" {_TOPOLOGIES[mesh.dimension]}>',
             _item(f"{FIELDS}:/cells", mesh.cells.shape, "Int"),
             "</Topology>",
@@ -160,20 +178,13 @@ class Fields:
             _item(f"{FIELDS}:/points_mm", mesh.points.shape, "Float"),
             "</Geometry>",
         ]
-        lines = ["<?xml version='1.0' encoding='utf-8'?>", '<Xdmf Version="3.0">', "<Domain>"]
-        lines.append('<Grid GridType="Collection" CollectionType="Temporal">')
-        for frame, time in enumerate(self._parts.times):
-            lines += ['<Grid Name="mesh">', f'<Time Value="{time!r}" />', *head]
-            for name, _, port in self._named:
-                kind = "Scalar" if len(port.shape) == 1 else "Vector"
-                center = _CENTERS[str(port.location)]
-                lines.append(f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">')
-                where = f"{FIELDS}:/{name}" if port.fixed else place.format(frame=frame, name=name)
-                lines += [_item(where, port.shape, "Float"), "</Attribute>"]
-            lines.append("</Grid>")
-        lines += ["</Grid>", "</Domain>", "</Xdmf>", ""]
-        with replacing(self._xdmf) as part:
-            part.write_text("\n".join(lines), encoding="utf-8")
+        for name, _, port in self._named:
+            kind = "Scalar" if len(port.shape) == 1 else "Vector"
+            center = _CENTERS[str(port.location)]
+            lines.append(f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">')
+            where = f"{FIELDS}:/{name}" if port.fixed else self._place.format(frame=frame, name=name)
+            lines += [_item(where, port.shape, "Float"), "</Attribute>"]
+        return "\n".join([*lines, "</Grid>"])
 
 
 def _item(place: str, shape: tuple[int, ...], kind: str) -> str:
@@ -183,11 +194,18 @@ def _item(place: str, shape: tuple[int, ...], kind: str) -> str:
     )
 
 
-def _window(group: h5py.Group, name: str, frame: int, shape: tuple[int, ...]) -> None:
-    """Add the data set `name` to `group`: one frame of the series of that name and `shape`, without data of its own."""
-    source = h5s.create_simple(shape)
-    source.select_hyperslab((frame, *[0] * (len(shape) - 1)), (1, *shape[1:]))
-    write_mapping(group, name, h5s.create_simple(shape[1:]), ".", f"/frames/{name}".replace("%", "%%"), source)
+class Windows:
+    """Data sets `name` without data of their own: each one frame of the series of that name and `shape`."""
+
+    def __init__(self, name: str, shape: tuple[int, ...]) -> None:
+        self._name, self._shape = name, shape
+        self._path = f"/frames/{name}".replace("%", "%%")
+        self._series, self._space = h5s.create_simple(shape), h5s.create_simple(shape[1:])
+
+    def add(self, group: h5py.Group, frame: int) -> None:
+        """Add the window on `frame` to `group`."""
+        self._series.select_hyperslab((frame, *[0] * (len(self._shape) - 1)), (1, *self._shape[1:]))
+        write_mapping(group, self._name, self._space, ".", self._path, self._series)
 
 
 def _named(participants: Mapping[str, Participant]) -> list[tuple[str, str, Port]]:

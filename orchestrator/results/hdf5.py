@@ -11,6 +11,7 @@ import io
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import h5py
@@ -107,6 +108,7 @@ def _untimed() -> h5p.PropDCID:
     return properties
 
 
+@cache
 def _intermediate() -> h5p.PropLCID:
     """A name may have slashes, which are groups."""
     properties = h5p.create(h5p.LINK_CREATE)

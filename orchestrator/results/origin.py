@@ -96,11 +96,16 @@ class Origin:
 
 
 def _versions() -> dict[str, str]:
-    found = {}
-    for name in _PACKAGES:
-        with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+    versions = {name: _version(name) for name in _PACKAGES}
+    return {name: version for name, version in versions.items() if version is not None}
+
+
+@cache
+def _version(name: str) -> str | None:
+    """Of what this process has imported, or would: looking a dozen packages up takes as long as many a step."""
+    with suppress(PackageNotFoundError):
+        return version(name)
+    return None
 
 
 def _counted(name: str, version: str) -> str:

@@ -47,6 +47,8 @@ def _line(cells: Sequence[str]) -> bytes:
 
 
 def _cell(value: float | int | str | None) -> str:
+    if type(value) is float or type(value) is int:
+        return repr(value)
     if value is None or isinstance(value, str):
         return value or ""
     # `item` makes plain numbers of NumPy's, whose repr is no number.

@@ -37,12 +37,14 @@ class TimeSeries:
     ) -> None:
         self._probes = probes
         self._chosen = any(participant.observed for participant in participants.values())
-        self._recorded = recorded(participants)
+        ports = recorded(participants)
         self.columns = ["time_ms"]
         self.texts: set[str] = set()
-        plain = [self._columns(port) for _, port in self._recorded]
+        plain = [self._columns(port) for _, port in ports]
+        # Each with the number of its columns.
+        self._recorded = [(unit, port, len(own)) for (unit, port), own in zip(ports, plain, strict=True)]
         times = Counter(["time_ms", *chain.from_iterable(plain)])
-        for (unit, port), own in zip(self._recorded, plain, strict=True):
+        for (unit, port), own in zip(ports, plain, strict=True):
             if any(times[name] > 1 for name in own):
                 own = [f"{unit}.{name}" for name in own]
             self.columns += own
@@ -58,10 +60,10 @@ class TimeSeries:
     def accept(self, step: Accepted, exchange: Exchange) -> None:
         """See Observer."""
         row: list[Cell] = [step.time_ms]
-        for unit, port in self._recorded:
+        for unit, port, columns in self._recorded:
             if unit in step.waiting:
                 # Not computed at this time: an empty cell, not a value of some time before.
-                row += [nan] * len(self._columns(port))
+                row += [nan] * columns
             else:
                 row += self._cells(port, exchange.value(unit, port.name))
         self.rows.append(row)

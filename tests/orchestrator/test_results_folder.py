@@ -210,8 +210,8 @@ def test_what_changed_since_is_named_and_nothing_is_touched(
     elif change == "program":
         monkeypatch.setattr(origins, "_program", lambda: "other")
     else:
-        version = origins.version
-        monkeypatch.setattr(origins, "version", lambda name: "0.0.1" if name == "numpy" else version(name))
+        version = origins._version
+        monkeypatch.setattr(origins, "_version", lambda name: "0.0.1" if name == "numpy" else version(name))
     ended = cosim(*_arguments(small_scenario, out, "--resume", "--set", "scene.mesh=own.msh"))
     assert (ended.code, ended.err.count("\n")) == (2, 1), ended
     words = {"mesh": "own.msh has changed since", "no mesh": "own.msh is gone", "program": "this program has changed"}
