@@ -19,6 +19,25 @@ class Usage:
     apart: bool = False
 
 
+class Moment(NamedTuple):
+    """What the clock and the CPU time of this thread show."""
+
+    wall_s: float
+    cpu_s: float
+
+    @classmethod
+    def now(cls) -> "Moment":
+        """Both of them now."""
+        # The clock is read outside of the other, whose reading may take a while where processes share a core.
+        wall_s = time.perf_counter()
+        return cls(wall_s, time.thread_time())
+
+    def used(self, apart: bool = False) -> Usage:
+        """What this thread has used since."""
+        cpu_s = time.thread_time() - self.cpu_s
+        return Usage(time.perf_counter() - self.wall_s, cpu_s, apart)
+
+
 class Span(NamedTuple):
     """`label` was busy with `what` from `begin`, a time of the process's clock, for `seconds`."""
 

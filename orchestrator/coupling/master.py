@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from time import perf_counter, thread_time
+from time import perf_counter
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..errors import (
     did_you_mean,
 )
 from ..participants.participant import Participant, Wait
-from ..stopwatch import Span, Stopwatch, Usage, seconds_by_label
+from ..stopwatch import Moment, Span, Stopwatch, Usage, seconds_by_label
 from .connections import Connection
 from .exchange import Exchange, Inputs, blaming
 from .loops import groups_in_order
@@ -233,9 +233,9 @@ class Master:
 
     def _charged(self, unit: str, call: Callable[[], Usage | None]) -> None:
         """Do a `call` of `unit`, and charge it with the CPU time of that."""
-        begin, cpu = perf_counter(), thread_time()
+        begun = Moment.now()
         usage = call()
-        self.watch.charge(unit, usage or Usage(perf_counter() - begin, thread_time() - cpu))
+        self.watch.charge(unit, usage or begun.used())
 
     def _settle(self, loop: Sequence[str]) -> None:
         """Initialise the units of a loop together, with initial values that agree."""
@@ -334,7 +334,7 @@ class Master:
         failure: ParticipantError | None = None
         with self.watch.measure(WAITING, "units"):
             for unit in units:
-                begin, cpu, reached = perf_counter(), thread_time(), self._reached[unit]
+                begun, reached = Moment.now(), self._reached[unit]
                 asked[unit] += 1
                 time, size = self._timeline.time_ms(reached), self._timeline.size_ms(end - reached)
                 try:
@@ -342,12 +342,11 @@ class Master:
                         wait = self.participants[unit].start(time / _MS_PER_S, size / _MS_PER_S)
                 except ParticipantError as error:
                     failure = failure or error
-                    here = Usage(perf_counter() - begin, thread_time() - cpu)
-                    self.watch.add(unit, "failed step", begin, here.wall_s)
+                    here = begun.used()
+                    self.watch.add(unit, "failed step", begun.wall_s, here.wall_s)
                     self.watch.charge(unit, here)
                 else:
-                    here = Usage(perf_counter() - begin, thread_time() - cpu)
-                    started.append((unit, begin, here, wait))
+                    started.append((unit, begun.wall_s, begun.used(), wait))
             # All are waited for, even if one has failed: none may be busy when it is spoken to again.
             for unit, begin, here, wait in started:
                 try:

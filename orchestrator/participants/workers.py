@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from itertools import cycle
 from pathlib import Path
-from time import perf_counter, thread_time
 from types import TracebackType
 from typing import Any
 
@@ -17,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from ..cluster import Cluster
 from ..errors import InputError, ParticipantError, ParticipantLost
-from ..stopwatch import Usage
+from ..stopwatch import Moment, Usage
 from .participant import Abilities, Implementation, Participant, Ports, Ramp, Values, Wait
 from .recipe import Recipe
 
@@ -89,17 +88,13 @@ class _Host:
         return self._measured(lambda: self._participant.start(time, size)())
 
     def _measured(self, call: Callable[[], object]) -> Usage:
-        begin, cpu = perf_counter(), thread_time()
-
-        def usage() -> Usage:
-            return Usage(perf_counter() - begin, thread_time() - cpu, self._apart)
-
+        begun = Moment.now()
         try:
             call()
         except ParticipantError as error:
-            error.usage = usage()
+            error.usage = begun.used(self._apart)
             raise
-        return usage()
+        return begun.used(self._apart)
 
     def save(self) -> int:
         self._saved += 1
