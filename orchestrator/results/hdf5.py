@@ -9,7 +9,7 @@ import errno
 import hashlib
 import io
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -61,12 +61,23 @@ def reading_sealed(path: Path) -> Iterator[h5py.File]:
 
     No damaged content ever reaches HDF5, which would not survive all of it.
     """
+    with h5py.File(h5f.open_file_image(sealed(path))) as file:
+        yield file
+
+
+def sealed(path: Path) -> bytes:
+    """The content of the file that `seal` put in place, an `image`; raises like `reading_sealed`."""
     whole = path.read_bytes()
     content, digest = whole[:-_SIZE], whole[-_SIZE:]
     if _DIGEST(content).digest() != digest:
         raise DamagedFile(path)
-    with h5py.File(h5f.open_file_image(content)) as file:
-        yield file
+    return content
+
+
+def places(content: bytes | bytearray, names: Iterable[str]) -> dict[str, tuple[int, int]]:
+    """Where in an `image` the numbers of these data sets are: the first byte, and how many there are."""
+    with h5py.File(h5f.open_file_image(bytes(content))) as file:
+        return {name: (file[name].id.get_offset(), file[name].id.get_storage_size()) for name in names}
 
 
 def write_streamed(path: Path, fill: Callable[[h5py.File], None]) -> None:

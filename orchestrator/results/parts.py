@@ -5,7 +5,7 @@ as there are files, whenever it is opened, so that nothing has to be written ane
 """
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from h5py import h5s
 
 from ..participants.participant import Values
 from ..writing import writing
-from .hdf5 import DamagedFile, image, reading_sealed, seal, write_array, write_mapping
+from .hdf5 import DamagedFile, image, places, reading_sealed, seal, sealed, write_array, write_mapping
 
 #: The time of a frame beside its fields.
 TIME = "time_ms"
@@ -33,7 +33,7 @@ class Parts:
         self.times: list[float] = []
         # All frames are the same file but for the numbers: that of the first one, and where the numbers are.
         self._image = bytearray()
-        self._places: dict[str, int] = {}
+        self._places: dict[str, tuple[int, int]] = {}
         for number in range(kept):
             with self.open(number) as file:
                 self.times.append(float(file[TIME][0]))
@@ -56,8 +56,8 @@ class Parts:
         if not self._image:
             self._lay_out(arrays)
         for name, array in arrays.items():
-            content = array.tobytes()
-            self._image[self._places[name] : self._places[name] + len(content)] = content
+            begin, size = self._places[name]
+            self._image[begin : begin + size] = array.tobytes()
         seal(self.path(len(self.times)), self._image)
         self.times.append(time_ms)
 
@@ -65,15 +65,27 @@ class Parts:
         def fill(file: h5py.File) -> None:
             for name, array in arrays.items():
                 write_array(file, name, array)
-            self._places = {name: file[name].id.get_offset() for name in arrays}
 
         self._image = bytearray(image(fill))
+        self._places = places(self._image, arrays)
 
     @contextmanager
     def open(self, number: int) -> Iterator[h5py.File]:
         """The fields of a frame by name."""
         with _open(self.path(number)) as file:
             yield file
+
+    def numbers(self, names: Collection[str]) -> Iterator[dict[str, memoryview]]:
+        """The bytes of these fields, by name, of each frame.
+
+        HDF5 is asked once where they are, for to it a small frame is as much work as a large one.
+        """
+        found: dict[str, tuple[int, int]] = {}
+        for number in range(len(self.times)):
+            content = _content(self.path(number))
+            found = found or places(content, names)
+            view = memoryview(content)
+            yield {name: view[begin : begin + size] for name, (begin, size) in found.items()}
 
     def remove(self) -> None:
         """Remove all frames."""
@@ -103,6 +115,13 @@ def check_parts(folder: Path, kept: int) -> None:
 
 def _path(folder: Path, number: int) -> Path:
     return folder / f"{number}.h5"
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return sealed(path)
+    except FileNotFoundError:
+        raise DamagedFile(path) from None
 
 
 @contextmanager

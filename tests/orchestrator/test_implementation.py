@@ -124,7 +124,7 @@ def test_packages_that_may_be_missing_are_of_the_origin_where_they_are_installed
 ) -> None:
     scenario = load_scenario(small_scenario)
     without = Origin.of(scenario, tmp_path)
-    monkeypatch.setattr(origin, "version", lambda name: "1.7.0")
+    monkeypatch.setattr(origin, "_version", lambda name: "1.7.0")
     having = Origin.of(scenario, tmp_path)
     assert having.versions["rslab"] == having.versions["pyamg"] == "1.7.0"
     assert "numpy was" in " ".join(having.changes(without))
