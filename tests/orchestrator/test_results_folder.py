@@ -208,7 +208,7 @@ def test_what_changed_since_is_named_and_nothing_is_touched(
     elif change == "no mesh":
         (tmp_path / "own.msh").unlink()
     elif change == "program":
-        monkeypatch.setattr(origins, "_program", lambda: "other")
+        monkeypatch.setattr(origins, "program", lambda: "other")
     else:
         version = origins._version
         monkeypatch.setattr(origins, "_version", lambda name: "0.0.1" if name == "numpy" else version(name))
