@@ -1,6 +1,7 @@
 """Where the points of a study are run, each once, and their results are kept: `points/<hash>` in the study's folder."""
 
 import os
+import shutil
 import time
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -23,6 +24,9 @@ from .point import Point
 from .trial import CRASHED, Trial, read_trial
 
 _POINTS = "points"
+
+#: What workers need for a while only.
+_SCRATCH = "scratch"
 
 #: Seconds that the repetitions of short runs may take in all, and the part of all other runs by which they may exceed
 #: that: a study of many short points is to be done soon.
@@ -58,6 +62,9 @@ class Bench:
 
     def __enter__(self) -> "Bench":
         self._stack.callback(FolderLock(self.folder).release)
+        # One that was killed may have left something.
+        self._clear()
+        self._stack.callback(self._clear)
         self._stack.enter_context(self._stop)
         return self
 
@@ -84,6 +91,9 @@ class Bench:
         return [trials[point.key] for point in wanted]
 
     # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _clear(self) -> None:
+        shutil.rmtree(self.folder / _SCRATCH, ignore_errors=True)
 
     def _place(self, point: Point) -> Path:
         return (self.folder / _POINTS / point.key).absolute()
@@ -116,7 +126,8 @@ class Bench:
                     raise Interrupted(self._stop.signal)
 
     def _job(self, point: Point) -> Job:
-        return Job(point.scenario, point.base.absolute(), self._place(point), self._repeats_s, self.is_alone)
+        scratch = (self.folder / _SCRATCH).absolute()
+        return Job(point.scenario, point.base.absolute(), self._place(point), scratch, self._repeats_s, self.is_alone)
 
     def _outcome(self, future: Future, point: Point) -> Trial:
         try:

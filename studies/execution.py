@@ -4,12 +4,14 @@ import json
 import threading
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 
 from ..orchestrator.assembly import check_units, checked_mesh
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.participants.native import Mesh
+from ..orchestrator.participants.unpacked import keep_unpacked
 from ..orchestrator.results.stored_run import StoredRun
 from ..orchestrator.run import run_scenario
 from ..orchestrator.scenario import Scenario
@@ -35,12 +37,14 @@ _meshes: dict[Hashable, Mesh | None] = {}
 class Job:
     """A scenario to be run in `folder`, its paths relative to `base`; a short run is repeated for up to `repeats_s`.
 
-    `alone` says whether nobody else uses the worker's cores meanwhile.
+    `alone` says whether nobody else uses the worker's cores meanwhile. What is needed for a while only goes to
+    `scratch`, which whoever asks removes: a worker may be killed.
     """
 
     scenario: Scenario
     base: Path
     folder: Path
+    scratch: Path
     repeats_s: float
     alone: bool
 
@@ -48,9 +52,17 @@ class Job:
 def execute(job: Job) -> Trial:
     """Run a point to its end, or go on with it where it was cut off; what came of it is written to its folder."""
     with _busy:
+        _keep(job.scratch)
         trial = _tried(job)
         trial.write()
         return trial
+
+
+@cache
+def _keep(scratch: Path) -> None:
+    """Whatever this process unpacks is kept for its next points."""
+    scratch.mkdir(parents=True, exist_ok=True)
+    keep_unpacked(Path(mkdtemp(dir=scratch)))
 
 
 def _tried(job: Job) -> Trial:
@@ -71,7 +83,7 @@ def _tried(job: Job) -> Trial:
     summary = StoredRun(job.folder).summary
     costs = [_cost(job.folder)]
     while len(costs) < _RUNS and costs[0].wall_s < _SHORT_S and sum(cost.wall_s for cost in costs[1:]) < job.repeats_s:
-        with TemporaryDirectory(prefix="cosim-") as folder:
+        with TemporaryDirectory(dir=job.scratch) as folder:
             run_scenario(job.scenario, job.base, Path(folder), mesh_of=_kept_mesh)
             costs.append(_cost(Path(folder)))
     return Trial(job.folder, DONE, "", tuple(costs), summary["solves"], summary["sweeps"], job.alone)
@@ -91,7 +103,7 @@ def _warm_up(job: Job) -> None:
         return
     _warm.add(what)
     run = scenario.run.model_copy(update={"stop_ms": min(scenario.output.every_ms, scenario.run.stop_ms)})
-    with TemporaryDirectory(prefix="cosim-") as folder:
+    with TemporaryDirectory(dir=job.scratch) as folder:
         try:
             run_scenario(scenario.model_copy(update={"run": run}), job.base, Path(folder), mesh_of=_kept_mesh)
         except Exception:

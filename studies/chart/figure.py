@@ -42,7 +42,9 @@ def draw(chart: Chart) -> Figure:
     notes = footnotes(chart)
     rows = [_Row(chart, [panel(chart, measure, view) for view in views(chart)]) for measure in chart.measures]
     width = _WIDTH - 2 * _MARGIN
-    title = broken(shortened(f"{chart.name}: error against cost, {chart.scenario}", _LONGEST), _TITLE_SIZE, width)
+    title = broken(
+        shortened(f"{chart.name}: error against cost, {Path(chart.scenario).name}", _LONGEST), _TITLE_SIZE, width
+    )
     signs = sign_entries(chart, [each for row in rows for each in row.panels], width)
     words = _below(chart, notes, width)
     head = 0.1 + 0.25 * len(title) + sum(max(entry.height_in for entry in row) for row in signs) + 0.1

@@ -8,6 +8,8 @@ import time
 from functools import partial
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.drawing import Drawing
 from cardiac_cosim.orchestrator.errors import Interrupted, RunError
@@ -131,10 +133,11 @@ def test_where_no_process_can_be_started_there_are_no_figures(tmp_path: Path, mo
 
 
 def test_a_bug_in_drawing_looks_like_one(tmp_path: Path) -> None:
-    (tmp_path / "timeseries.csv").write_text("time_ms,lv_volume_ml\n0.0,no number\n")
+    with h5py.File(tmp_path / "fields.h5", "w") as file:
+        file["points_mm"], file["cells"], file["fiber"] = np.eye(4, 3), [[0, 1, 2, 99]], [[1.0, 0.0, 0.0]]
     with Drawing(tmp_path) as drawing:
         drawing.begin()
-        with pytest.raises(RuntimeError, match=r"ValueError: .*no number"):
+        with pytest.raises(RuntimeError, match=r"IndexError: .*99"):
             drawing.finish()
 
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from cardiac_cosim.orchestrator import cli
+from cardiac_cosim.cli import app as cli
 from typer.testing import CliRunner
 
 _ROOT = Path(__file__).parent.parent.parent.parent

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cardiac_cosim.cli import app as cli
 from cardiac_cosim.fmus.cache import cached_fmu
 from cardiac_cosim.fmus.fmi3 import build
-from cardiac_cosim.orchestrator import cli
 from cardiac_cosim.orchestrator.errors import InputError, ParticipantError, RunError
 from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
 from cardiac_cosim.orchestrator.participants.native import NativeParticipant
