@@ -53,9 +53,9 @@ def page(chart: Chart) -> str:
 <h1>{safe(chart.name)}: error against cost</h1>
 <p>Every point is a run of the scenario <code>{safe(Path(chart.scenario).name)}</code> with other settings. Lower is
 more accurate, farther left is cheaper. Full markers are on the front, for no point is both cheaper and as accurate;
-hollow ones are dominated. The order is the observed order of accuracy: the power of the varied number by which the error grows. Arrows
-at an edge are errors that are infinite or exactly zero; a cross is a point without a result. Hover over a point for all
-that is known of it; click a name to hide a line.</p>
+hollow ones are dominated. The order is the observed order of accuracy: the power of the varied number by which the
+error grows. Arrows at an edge are errors that are infinite or exactly zero; a cross is a point without a result.
+Hover over a point for all that is known of it; click a name to hide a line.</p>
 <ul>
 {about}
 </ul>
