@@ -1,0 +1,68 @@
+"""The runs of a budget: a scenario with some settings, each run once, and the headlines of its results."""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from ...orchestrator.errors import InputError, RunError
+from ...orchestrator.results.comparison import headlines
+from ...orchestrator.results.stored_run import StoredRun
+from ..bench import Bench
+from ..plan import Variants
+from ..point import Point, told
+from ..trial import REFUSED
+from .source import Settings
+
+
+@dataclass(frozen=True)
+class Tried:
+    """The headlines of a run and the seconds that it took; none, and the `reason`, where it has no results."""
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+    reason: str = ""
+
+
+class Runs:
+    """Those of `variants` on the `bench`; `known` are results of the scenario itself, which need not be run again."""
+
+    def __init__(self, variants: Variants, bench: Bench, known: StoredRun | None = None) -> None:
+        self._variants = variants
+        self._bench = bench
+        self._tried: dict[str, Tried] = {}
+        if known is not None:
+            self._tried[_key({})] = Tried(headlines(known), known.summary["wall_s"]["total"])
+
+    def base(self) -> Tried:
+        """The scenario as it is; InputError or RunError where it has no results."""
+        if _key({}) not in self._tried:
+            (trial,) = self._bench.run([self._variants.point({})], "the scenario itself")
+            if not trial.is_done:
+                raise (InputError if trial.status == REFUSED else RunError)(trial.reason)
+            self._tried[_key({})] = Tried(headlines(trial.run), trial.wall_s)
+        return self[{}]
+
+    def run(self, wanted: Iterable[Settings], title: str) -> None:
+        """Run what was not run yet. What cannot be run, or fails, has a reason afterwards."""
+        points = dict[str, Point]()
+        for settings in wanted:
+            key = _key(settings)
+            if key not in self._tried and key not in points:
+                try:
+                    points[key] = self._variants.point(settings)
+                except InputError as error:
+                    self._tried[key] = Tried(reason=str(error))
+        for key, trial in zip(points, self._bench.run(points.values(), title), strict=True):
+            reason = f"the run with {told(points[key].settings)} {trial.status}: {trial.reason}"
+            self._tried[key] = Tried(headlines(trial.run), trial.wall_s) if trial.is_done else Tried(reason=reason)
+
+    def __getitem__(self, settings: Settings) -> Tried:
+        """What came of a run that was asked for; KeyError for others."""
+        return self._tried[_key(settings)]
+
+    def __contains__(self, settings: Settings) -> bool:
+        return _key(settings) in self._tried
+
+
+def _key(settings: Settings) -> str:
+    return json.dumps(dict(settings), sort_keys=True)
