@@ -103,10 +103,10 @@ def _contribution(source: Source, quantity: str, value: float, runs: Runs) -> Co
     values, reasons = _values(source, quantity, runs)
     if BASE in values and FINER in values:
         estimate = richardson(values, source.ratio, source.highest_order)
-        finest = source.levels[max(values)].settings
+        finest = source.levels[max(values)]
     else:
         reason = reasons.get(BASE) or reasons.get(FINER) or ""
-        estimate, finest = Estimate(nan, None, False, reason), source.levels[FINER].settings
+        estimate, finest = Estimate(nan, None, False, reason), source.levels[FINER]
     return Contribution(
         source.name,
         quantity,
@@ -115,7 +115,7 @@ def _contribution(source: Source, quantity: str, value: float, runs: Runs) -> Co
         estimate.order,
         estimate.trusted,
         estimate.reason if estimate.is_settled else "; ".join([estimate.reason, *_help(source, values, reasons, runs)]),
-        told(finest),
+        str(finest),
         estimate.negligible,
     )
 
@@ -129,5 +129,5 @@ def _help(source: Source, values: Mapping[int, float], reasons: Mapping[int, str
     if FINEST in values:
         return [source.remedy]
     minutes = _predicted_s(source, runs) / 60.0
-    run = told(source.levels[FINEST].settings)
+    run = source.levels[FINEST]
     return [f"a run with {run} would help, which takes about {minutes:.0f} minutes and was not made", source.remedy]

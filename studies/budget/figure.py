@@ -34,7 +34,7 @@ def draw_budget(budget: Budget) -> Figure:
         axis.set_yticks(range(len(names)), names if place % columns == 0 else [""] * len(names), fontsize=9)
     for axis in axes[len(budget.quantities) :]:
         axis.remove()
-    figure.suptitle(f"{budget.name}: numerical error by source", fontsize=12)
+    figure.suptitle(f"{budget.name}: numerical error by source (+ the value is too large, − too small)", fontsize=12)
     figure.legend(
         handles=[
             Patch(label="estimate, trusted", **_TRUSTED),
@@ -69,4 +69,4 @@ def _label(contribution: Contribution) -> str:
         return "unknown"
     if contribution.negligible:
         return "negligible"
-    return f"{contribution.estimate:+.2g}"
+    return f"{contribution.estimate:+.2g}".replace("-", "−")

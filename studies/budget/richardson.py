@@ -12,7 +12,7 @@ _ROUND_OFF = 1e-9
 #: With the order 1/2 the estimate is twice the difference to the run at FINEST, if the ratio is 2.
 _LOWEST_ORDER = 0.5
 
-#: How far an order that was not confirmed by a run at FINEST may be from a whole number.
+#: How far an order that only three runs show may be from a whole number; where they are the finest, below one.
 _CLEAR = 0.25
 
 #: By which factor the estimates of two triplets of runs may differ.
@@ -59,10 +59,14 @@ def richardson(values: Mapping[int, float], ratio: float, highest_order: float) 
     order, why = _order(apart[BASE], apart[FINER], ratio, highest_order, noise) if fine else (None, "")
     if fine and not why and COARSER in values:
         why = _disagreement(apart[COARSER], apart[BASE], apart[FINER])
+    elif order is not None and not why and order < 1.0 - _CLEAR:
+        why = f"the observed order {order:.2g} is low, and there is no coarser run that confirms it"
     if not fine:
         order, why = _order(apart[COARSER], apart[BASE], ratio, highest_order, noise)
         if order is not None and not why and abs(order - max(1, round(order))) > _CLEAR:
-            why = f"the observed order {order:.2g} is not clear, and no run at twice that refinement confirms it"
+            why = (
+                f"the observed order {order:.2g} is not near a whole number, and there is no finer run that confirms it"
+            )
     if why or order is None:
         return Estimate(indication, order, False, why)
     return Estimate(apart[BASE] / (1.0 - ratio**-order), order, True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ...orchestrator.errors import InputError, RunError
 from ...orchestrator.results.comparison import headlines
 from ...orchestrator.results.stored_run import StoredRun
+from ...orchestrator.scenario import Contradiction
 from ..bench import Bench
 from ..plan import Variants
 from ..point import Point, told
@@ -51,7 +52,8 @@ class Runs:
                 try:
                     points[key] = self._variants.point(settings)
                 except InputError as error:
-                    self._tried[key] = Tried(reason=str(error))
+                    problem = error.problem if isinstance(error, Contradiction) else str(error)
+                    self._tried[key] = Tried(reason=f"there is no run with {told(settings)}: {problem}")
         for key, trial in zip(points, self._bench.run(points.values(), title), strict=True):
             reason = f"the run with {told(points[key].settings)} {trial.status}: {trial.reason}"
             self._tried[key] = Tried(headlines(trial.run), trial.wall_s) if trial.is_done else Tried(reason=reason)

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..point import told
+
 #: Values at keys of a scenario.
 Settings = Mapping[str, Any]
 
@@ -30,6 +32,9 @@ class Level:
     def runs(self) -> Sequence[Settings]:
         """The settings of all runs that it needs."""
         return [self.settings] if self.beside is None else [self.settings, self.beside]
+
+    def __str__(self) -> str:
+        return " against ".join(told(settings) for settings in self.runs)
 
 
 @dataclass(frozen=True)
