@@ -53,20 +53,20 @@ def richardson(values: Mapping[int, float], ratio: float, highest_order: float) 
     apart = {level: values[level] - values[level + 1] for level in sorted(values) if level + 1 in values}
     if all(abs(difference) <= noise for level, difference in apart.items() if level >= BASE):
         return Estimate(indication, None, False, f"negligible: below round-off, {noise:.1g}", True)
-    if FINEST not in values and COARSER not in values:
-        return Estimate(indication, None, False, "two runs do not show the order")
-    fine = FINEST in values
-    order, why = _order(apart[BASE], apart[FINER], ratio, highest_order, noise) if fine else (None, "")
-    if fine and not why and COARSER in values:
-        why = _disagreement(apart[COARSER], apart[BASE], apart[FINER])
-    elif order is not None and not why and order < 1.0 - _CLEAR:
-        why = f"the observed order {order:.2g} is low, and there is no coarser run that confirms it"
-    if not fine:
+    if FINEST in values:
+        order, why = _order(apart[BASE], apart[FINER], ratio, highest_order, noise)
+        if COARSER in values:
+            why = why or _disagreement(apart[COARSER], apart[BASE], apart[FINER])
+        elif order is not None and order < 1.0 - _CLEAR:
+            why = why or f"the observed order {order:.2g} is low, and there is no coarser run to confirm it"
+    elif COARSER in values:
         order, why = _order(apart[COARSER], apart[BASE], ratio, highest_order, noise)
-        if order is not None and not why and abs(order - max(1, round(order))) > _CLEAR:
+        if order is not None and abs(order - max(1, round(order))) > _CLEAR:
             why = (
-                f"the observed order {order:.2g} is not near a whole number, and there is no finer run that confirms it"
+                why or f"the observed order {order:.2g} is not a whole number, and there is no finer run to confirm it"
             )
+    else:
+        order, why = None, "two runs do not show the order"
     if why or order is None:
         return Estimate(indication, order, False, why)
     return Estimate(apart[BASE] / (1.0 - ratio**-order), order, True)
