@@ -14,7 +14,7 @@ from .runs import Runs
 from .source import BASE, COARSER, FINER, FINEST, Settings, Source
 from .sources import sources_of, unknown_sources
 
-#: A run that is to take longer than this, in seconds, is not made to confirm an order.
+#: A run that is to take longer than this, in processor seconds, is not made to confirm an order.
 _LONGEST_S = 600.0
 
 
@@ -72,7 +72,7 @@ def _is_open(source: Source, quantities: Iterable[str], runs: Runs) -> bool:
 
 
 def _predicted_s(source: Source, runs: Runs) -> float:
-    """Seconds that the runs at FINEST are going to take that were not made, if they grow as those before did."""
+    """Processor seconds of the runs at FINEST that were not made, if they grow as those before did."""
     before = runs[source.levels[BASE].settings].seconds
     pairs = zip(source.levels[FINER].runs, source.levels[FINEST].runs, strict=True)
     return sum(runs[one].seconds * max(1.0, runs[one].seconds / before) for one, next_ in pairs if next_ not in runs)

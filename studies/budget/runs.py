@@ -17,7 +17,7 @@ from .source import Settings
 
 @dataclass(frozen=True)
 class Tried:
-    """The headlines of a run and the seconds that it took; none, and the `reason`, where it has no results."""
+    """The headlines of a run and its processor seconds; none, and the `reason`, where it has no results."""
 
     values: Mapping[str, float] = field(default_factory=dict)
     seconds: float = 0.0
@@ -32,15 +32,15 @@ class Runs:
         self._bench = bench
         self._tried: dict[str, Tried] = {}
         if known is not None:
-            self._tried[_key({})] = Tried(headlines(known), known.summary["wall_s"]["total"])
+            self._tried[_key({})] = Tried(headlines(known), known.summary["cpu_s"]["total"])
 
     def base(self) -> Tried:
         """The scenario as it is; InputError or RunError where it has no results."""
         if _key({}) not in self._tried:
-            (trial,) = self._bench.run([self._variants.point({})], "the scenario itself")
+            (trial,) = self._bench.run([self._point({})], "the scenario itself")
             if not trial.is_done:
                 raise (InputError if trial.status == REFUSED else RunError)(trial.reason)
-            self._tried[_key({})] = Tried(headlines(trial.run), trial.wall_s)
+            self._tried[_key({})] = Tried(headlines(trial.run), trial.cpu_s)
         return self[{}]
 
     def run(self, wanted: Iterable[Settings], title: str) -> None:
@@ -50,13 +50,20 @@ class Runs:
             key = _key(settings)
             if key not in self._tried and key not in points:
                 try:
-                    points[key] = self._variants.point(settings)
+                    points[key] = self._point(settings)
                 except InputError as error:
                     problem = error.problem if isinstance(error, Contradiction) else str(error)
                     self._tried[key] = Tried(reason=f"there is no run with {told(settings)}: {problem}")
         for key, trial in zip(points, self._bench.run(points.values(), title), strict=True):
-            reason = f"the run with {told(points[key].settings)} {trial.status}: {trial.reason}"
-            self._tried[key] = Tried(headlines(trial.run), trial.wall_s) if trial.is_done else Tried(reason=reason)
+            how = "was refused" if trial.status == REFUSED else trial.status
+            reason = f"the run with {told(points[key].settings)} {how}: {trial.reason}"
+            self._tried[key] = Tried(headlines(trial.run), trial.cpu_s) if trial.is_done else Tried(reason=reason)
+
+    def _point(self, settings: Settings) -> Point:
+        """Units are called directly: that gives the same bits, and FMUs on meshes so fine are larger than is read."""
+        point = self._variants.point(settings)
+        run = point.scenario.run.model_copy(update={"participants": "native"})
+        return Point(point.scenario.model_copy(update={"run": run}), point.base, point.settings)
 
     def __getitem__(self, settings: Settings) -> Tried:
         """What came of a run that was asked for; KeyError for others."""

@@ -83,7 +83,7 @@ class Runner:
             is_done=not reason,
             status="failed" if reason else "done",
             reason=reason,
-            wall_s=self.seconds(point.scenario),
+            cpu_s=self.seconds(point.scenario),
             run=SimpleNamespace(summary=summary, columns={}),
         )
 

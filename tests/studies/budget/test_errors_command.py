@@ -43,12 +43,17 @@ def test_a_budget_is_told_written_and_not_computed_twice(strand: Path, tmp_path:
 
 
 def test_a_run_with_a_budget_has_that_of_its_own_numbers(strand: Path, tmp_path: Path, cosim: Cosim) -> None:
+    # By FMUs, while the budget calls the units directly.
     out = tmp_path / "run"
-    ended = cosim("run", strand, *_SHORT, "--output", out, "--no-figures", "--error-budget")
+    by = ("--participants", "fmu", "--fmu-dir", tmp_path / "fmus")
+    ended = cosim("run", strand, *_SHORT, *by, "--output", out, "--no-figures", "--error-budget")
     assert ended.code == 0, ended.err
     assert ended.out.index("results in") < ended.out.index("± ")
     values = {row["quantity"]: float(row["value"]) for row in _rows(out)}
     assert values == headlines(StoredRun(out))
+    direct = cosim("errors", strand, *_SHORT, "--output", tmp_path / "direct")
+    assert direct.code == 0
+    assert _rows(tmp_path / "direct") == _rows(out)
     # Another run in the same folder does not stand beside the errors of this one.
     assert cosim("run", strand, *_SHORT, "--output", out, "--no-figures").code == 0
     assert not list(out.glob("errors.*"))
