@@ -38,7 +38,7 @@ def draw_budget(budget: Budget) -> Figure:
     figure.legend(
         handles=[
             Patch(label="estimate, trusted", **_TRUSTED),
-            Patch(label="not trusted: difference to the finest run", **_NOT_TRUSTED),
+            Patch(label="(not trusted): difference to the finest run", **_NOT_TRUSTED),
         ],
         loc="outside lower center",
         ncols=2,
@@ -69,4 +69,6 @@ def _label(contribution: Contribution) -> str:
         return "unknown"
     if contribution.negligible:
         return "negligible"
-    return f"{contribution.estimate:+.2g}".replace("-", "−")
+    text = f"{contribution.estimate:+.2g}".replace("-", "−")
+    # Bars may be too short to see how they are filled.
+    return text if contribution.trusted else f"({text})"

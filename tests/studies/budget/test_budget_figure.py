@@ -39,12 +39,12 @@ def test_bars_that_are_not_trusted_are_hollow_and_hatched() -> None:
     assert [bar.get_width() for bar in bars] == [0.3, 8.6, 1e-12, 0.0]
     assert [bool(bar.get_hatch()) for bar in bars] == [False, True, True, True]
     assert bars[0].get_facecolor() != bars[1].get_facecolor() == (1.0, 1.0, 1.0, 1.0)
-    assert [text.get_text() for text in axes[0].texts] == ["−0.3", "+8.6", "negligible", "unknown"]
+    assert [text.get_text() for text in axes[0].texts] == ["−0.3", "(+8.6)", "negligible", "unknown"]
     # The first source is on top, and all numbers have room.
     assert axes[0].yaxis_inverted()
     assert axes[0].get_xlim()[1] > 1.3 * 8.6
     labels = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
-    assert labels == {"estimate, trusted", "not trusted: difference to the finest run"}
+    assert labels == {"estimate, trusted", "(not trusted): difference to the finest run"}
 
 
 def test_a_budget_without_any_error_is_drawn_too(tmp_path: Path) -> None:
