@@ -15,7 +15,13 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (scenario_commands.run, scenario_commands.build, scenario_commands.show, study_commands.chart):
+for command in (
+    scenario_commands.run,
+    scenario_commands.build,
+    scenario_commands.show,
+    study_commands.chart,
+    study_commands.errors,
+):
     app.command()(command)
 
 

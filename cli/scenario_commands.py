@@ -10,7 +10,7 @@ from rich.console import Console
 from ..orchestrator.errors import InputError, Interrupted
 from ..orchestrator.scenario import Scenario
 from .exit_codes import INTERRUPTED
-from .scenario_file import Assignments, ScenarioFile, about, opened
+from .scenario_file import Assignments, ScenarioFile, about, opened, variants
 
 
 def run(
@@ -26,6 +26,10 @@ def run(
         bool, typer.Option("--resume", help="Go on from the last checkpoint in the results folder, if there is one.")
     ] = False,
     figures: Annotated[bool, typer.Option(help="Draw the figures when the run is done.")] = True,
+    error_budget: Annotated[
+        bool,
+        typer.Option("--error-budget", help="Then run finer variants too, and tell the error of each number."),
+    ] = False,
 ) -> None:
     """Run a scenario and write time series, fields, coupling log, summary and figures."""
     # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
@@ -44,9 +48,14 @@ def run(
                 )
                 print(f"interrupted; the results so far are in {folder}{rest}", file=sys.stderr)
                 raise typer.Exit(INTERRUPTED + error.signal) from None
-    for warning in outcome.warnings:
-        _warn(warning)
-    _report(scenario, outcome.folder, outcome.summary)
+        for warning in outcome.warnings:
+            _warn(warning)
+        _report(scenario, outcome.folder, outcome.summary)
+        if error_budget:
+            # Imported here, because most runs do not need it.
+            from .study_commands import append_budget
+
+            append_budget(file, variants(file, overrides, scenario, base), folder)
 
 
 def build(

@@ -1,14 +1,18 @@
 """The file that a command is about: opened, and in front of whatever is wrong with its content."""
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..orchestrator.errors import InputError
-from ..orchestrator.scenario import Scenario, load_scenario
+from ..orchestrator.scenario import Scenario, load_scenario, parsed_assignment
+
+if TYPE_CHECKING:
+    from ..studies.plan import Variants
 
 ScenarioFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file, or a system package (.ssp).")
@@ -17,6 +21,9 @@ Assignments = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a key of the scenario; may be repeated."),
 ]
+
+#: A system package as a scenario file, beside what was unpacked; YAML reads JSON too.
+_RESOLVED = "resolved-scenario.json"
 
 
 @contextmanager
@@ -30,6 +37,18 @@ def opened(file: Path, assignments: list[str]) -> Iterator[tuple[Scenario, Path]
 
     with open_package(file, assignments, lambda text: typer.echo(f"note: {text}", err=True)) as package:
         yield package
+
+
+def variants(file: Path, assignments: list[str], scenario: Scenario, base: Path) -> "Variants":
+    """What `opened` gave, to be run with other settings too, for as long as it is open."""
+    # Imported here, so that a run does not wait for what studies need.
+    from ..studies.plan import Variants
+
+    if file.suffix.lower() != ".ssp":
+        return Variants(file, dict(parsed_assignment(text) for text in assignments), str(file))
+    content = base / _RESOLVED
+    content.write_text(json.dumps(scenario.resolved()), encoding="utf-8")
+    return Variants(content, {}, str(file))
 
 
 @contextmanager

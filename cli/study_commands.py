@@ -1,17 +1,21 @@
-"""`cosim chart`: studies, which run scenarios many times."""
+"""`cosim chart` and `cosim errors`: studies, which run scenarios many times."""
 
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from ..orchestrator.errors import InputError, Interrupted
 from .exit_codes import INTERRUPTED
-from .scenario_file import Assignments
+from .scenario_file import Assignments, ScenarioFile, about, opened, variants
+
+if TYPE_CHECKING:
+    from ..orchestrator.results.stored_run import StoredRun
+    from ..studies.plan import Variants
 
 Workers = Annotated[
     int | None,
@@ -58,6 +62,57 @@ def chart(
         typer.echo(f"note: {note}", err=True)
     typer.echo(charted.summary())
     typer.echo(f"  chart in {folder}")
+
+
+def errors(
+    file: ScenarioFile,
+    output: Annotated[Path | None, typer.Option(help="Folder of the budget; default results/<name>.errors.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    assignments: Assignments = None,
+) -> None:
+    """Tell the numerical error of every number that a scenario gives, and which part of it comes from where.
+
+    The scenario is run as it is, and finer in one source of error at a time: communication step, internal steps, meshes
+    and tolerances. A budget that was interrupted goes on where it stopped.
+    """
+    _one_of(workers, scheduler)
+    with opened(file, assignments or []) as (scenario, base):
+        folder = output or Path("results") / f"{scenario.name}.errors"
+        _budget(file, variants(file, assignments or [], scenario, base), folder, workers, scheduler)
+    typer.echo(f"  error budget in {folder}")
+
+
+def append_budget(file: Path, variants: "Variants", folder: Path) -> None:
+    """Add the error budget of the run in `folder`, of the scenario in `file`, to that folder."""
+    # Imported here, so that help does not wait for numerical libraries.
+    from ..orchestrator.results.stored_run import StoredRun
+
+    _budget(file, variants, folder, known=StoredRun(folder))
+
+
+def _budget(
+    file: Path,
+    variants: "Variants",
+    folder: Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    known: "StoredRun | None" = None,
+) -> None:
+    from ..studies.bench import Bench
+    from ..studies.budget import error_budget, sentences, write_budget
+
+    # What is wrong with it is said with the file in front.
+    variants.scenario({})
+    console = Console(stderr=True)
+    with _resumable(folder), about(file), Bench(folder, console, workers, scheduler) as bench:
+        budget = error_budget(variants, bench, known)
+        with console.status("drawing the budget"):
+            write_budget(budget, folder)
+    for note in budget.notes:
+        typer.echo(f"note: {note}", err=True)
+    for text in sentences(budget):
+        typer.echo(f"  {text}")
 
 
 def _one_of(workers: int | None, scheduler: str | None) -> None:

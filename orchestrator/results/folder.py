@@ -17,7 +17,20 @@ from ..writing import allowed, remove_stale, writing
 from .checkpoint import Memories, read_checkpoint
 from .hdf5 import DamagedFile
 from .lock import FolderLock
-from .names import CHECKPOINT, COUPLING, FIELDS, FMU_LOG, GROWING, ITERATIONS, PARTS, SUMMARY, TIME_SERIES, WHOLE, XDMF
+from .names import (
+    BUDGET,
+    CHECKPOINT,
+    COUPLING,
+    FIELDS,
+    FMU_LOG,
+    GROWING,
+    ITERATIONS,
+    PARTS,
+    SUMMARY,
+    TIME_SERIES,
+    WHOLE,
+    XDMF,
+)
 from .origin import Origin
 from .recording import Recording
 from .summary import is_summary
@@ -124,7 +137,8 @@ class ResultsFolder:
         implementations: Mapping[str, Implementation],
     ) -> Recording:
         # First what would let the rest pass for the result of an earlier run.
-        remove_stale(self.path / SUMMARY)
+        for name in (SUMMARY, *BUDGET):
+            remove_stale(self.path / name)
         if before is None:
             remove_stale(self.path / CHECKPOINT)
             remove_stale(self.path / FMU_LOG)

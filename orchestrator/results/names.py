@@ -10,6 +10,13 @@ SUMMARY = "summary.json"
 #: Only where an FMU logs something.
 FMU_LOG = "fmu.log"
 
+#: What a budget of the run's numerical errors appends.
+BUDGET_CSV = "errors.csv"
+BUDGET_JSON = "errors.json"
+BUDGET_PNG = "errors.png"
+BUDGET_SVG = "errors.svg"
+BUDGET = (BUDGET_CSV, BUDGET_JSON, BUDGET_PNG, BUDGET_SVG)
+
 #: Only while a run goes on, or to go on from.
 PARTS = "fields.parts"
 CHECKPOINT = "checkpoint.h5"
