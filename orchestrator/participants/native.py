@@ -38,6 +38,7 @@ __all__ = [
     "check_unit",
     "element_quality",
     "fmu_of_unit",
+    "is_memoryless",
     "located",
     "mesh_warnings",
     "packed_mesh",
@@ -132,6 +133,13 @@ def _declared_parameters(unit: str) -> dict[str, Variable]:
     return {
         variable.name: variable for variable in UNITS[unit].variables() if variable.causality is Causality.PARAMETER
     }
+
+
+def is_memoryless(unit: str) -> bool:
+    """Whether a unit's outputs follow its inputs at once, as those of an equilibrium do; InputError if it is none."""
+    if unit not in UNITS:
+        raise InputError(f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}")
+    return UNITS[unit].memoryless
 
 
 def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Ports]:

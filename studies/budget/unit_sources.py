@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from ...orchestrator.participants.native import accuracy_parameters
+from ...orchestrator.participants.native import accuracy_parameters, is_memoryless
 from ...orchestrator.scenario import Scenario
 from .internal_steps import InternalStep, internal_steps
 from .source import COARSER, FINER, LEVELS, TOLERANCE_ORDER, TOLERANCE_RATIO, Level, Source
@@ -39,12 +39,18 @@ def other_meshes(scenario: Scenario) -> Source | None:
     less = ", less what that changes for the units that can refine their own mesh" if own else ""
     other = "take a smaller `scene.mesh_size_mm`" if scenario.scene.mesh is None else "bring a finer mesh"
     return Source(
-        "mesh of the other units" if own else "mesh",
+        _shared(scenario) if own else "mesh",
         f"`scene.refine` + 1{less}",
         "the mesh size",
         levels,
         f"raise `scene.refine`, or {other}",
     )
+
+
+def _shared(scenario: Scenario) -> str:
+    """Who solves on the scene's mesh, where others have meshes of their own: the units in equilibrium."""
+    solving = [name for name, entry in scenario.units.items() if entry.unit is not None and is_memoryless(entry.unit)]
+    return f"{' and '.join(solving)} mesh" if solving else "mesh of the other units"
 
 
 def _step(step: InternalStep, adaptive: bool, name: str) -> Source:

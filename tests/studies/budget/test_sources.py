@@ -30,7 +30,7 @@ def test_a_heartbeat_has_errors_of_coupling_substep_meshes_and_equilibrium() -> 
         "electrophysiology sub-step",
         "electrophysiology mesh",
         "mechanics equilibrium tolerance",
-        "mesh of the other units",
+        "mechanics mesh",
     ]
     assert _settings(sources["communication step"]) == {
         -1: {"coupling.step_ms": 2.0},
@@ -48,9 +48,9 @@ def test_a_heartbeat_has_errors_of_coupling_substep_meshes_and_equilibrium() -> 
     assert _settings(sources["mechanics equilibrium tolerance"])[1] == {_TOLERANCE: 2.5e-7}
     assert sources["mechanics equilibrium tolerance"].ratio == 4.0
     # Both meshes are finer with the scene's, and one of them alone.
-    finest = sources["mesh of the other units"].levels[2]
+    finest = sources["mechanics mesh"].levels[2]
     assert finest.runs == [{"scene.refine": 2}, {_REFINE: 2}]
-    assert -1 not in sources["mesh of the other units"].levels
+    assert -1 not in sources["mechanics mesh"].levels
 
 
 def test_sources_that_a_scenario_does_not_have_are_left_out() -> None:
@@ -88,7 +88,7 @@ def test_foreign_fmus_have_the_errors_of_their_coupling_and_a_note(tmp_path: Pat
 
 
 def test_a_coarser_scene_leaves_the_meshes_of_units_as_they_are() -> None:
-    others = _sources("strand", "scene.refine=1", f"{_REFINE}=2")["mesh of the other units"]
+    others = _sources("strand", "scene.refine=1", f"{_REFINE}=2")["mechanics mesh"]
     assert {level: list(at.runs) for level, at in others.levels.items()} == {
         -1: [{"scene.refine": 0, _REFINE: 3}],
         0: [{}],
