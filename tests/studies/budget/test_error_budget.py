@@ -44,11 +44,11 @@ def test_each_source_gets_its_own_error(strand: Path, runner: Any) -> None:
         "communication step": (True, pytest.approx(0.3), pytest.approx(1.0)),
         "electrophysiology sub-step": (True, pytest.approx(-0.8), pytest.approx(2.0)),
         "electrophysiology mesh": (True, pytest.approx(9.0), pytest.approx(2.0)),
-        "mesh of the other units": (True, pytest.approx(2.0), pytest.approx(1.0)),
+        "mechanics mesh": (True, pytest.approx(2.0), pytest.approx(1.0)),
     }
     assert all(each.value == pytest.approx(110.5) for each in found.values())
     assert sentences(budget) == [
-        "activation at near: 110 ms ± 12, of which the electrophysiology mesh makes 9, the mesh of the other units 2, "
+        "activation at near: 110 ms ± 12, of which the electrophysiology mesh makes 9, the mechanics mesh 2, "
         "the electrophysiology sub-step 0.8 and the communication step 0.3"
     ]
 
@@ -74,7 +74,7 @@ def test_runs_that_would_take_too_long_are_not_made_and_not_trusted(strand: Path
 
     # The finest would take 675 s, and 0.1 + 3.2 s of its own.
     bench = runner(_lawful, seconds)
-    others = _by_source(error_budget(_variants(strand), bench))["mesh of the other units"]
+    others = _by_source(error_budget(_variants(strand), bench))["mechanics mesh"]
     assert {"scene.refine": 2} not in bench.ran
     assert not others.trusted
     assert others.estimate == pytest.approx(1.0)
@@ -82,7 +82,7 @@ def test_runs_that_would_take_too_long_are_not_made_and_not_trusted(strand: Path
     assert "about 11 minutes" in others.reason
     assert others.finer == "scene.refine=1 against units.electrophysiology.parameters.refine=1"
     quick = runner(_lawful, lambda scenario: 0.8 * seconds(scenario))
-    assert _by_source(error_budget(_variants(strand), quick))["mesh of the other units"].trusted
+    assert _by_source(error_budget(_variants(strand), quick))["mechanics mesh"].trusted
 
 
 def test_a_run_that_fails_takes_its_source_only(strand: Path, runner: Any) -> None:
