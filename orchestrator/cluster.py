@@ -50,6 +50,11 @@ class Cluster:
         """Whether the workers are on this machine, and end with us."""
         return self._where in ("threads", "processes")
 
+    @property
+    def count(self) -> int:
+        """How many workers there are now."""
+        return len(self.client.scheduler_info(n_workers=-1)["workers"])
+
     def __enter__(self) -> "Cluster":
         return self
 

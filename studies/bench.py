@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..orchestrator.cluster import Cluster
-from ..orchestrator.errors import InputError, Interrupted
+from ..orchestrator.errors import InputError, Interrupted, RunError
 from ..orchestrator.results.lock import FolderLock
 from ..orchestrator.results.origin import program
 from ..orchestrator.stopping import StopRequest
@@ -34,6 +34,9 @@ _REPEATS_S, _REPEATS = 15.0, 0.1
 
 #: How often we look whether somebody wants us to stop, in seconds.
 _LOOK_S = 0.2
+
+#: How long a worker that died may take to be started again, in seconds.
+_PATIENCE_S = 60.0
 
 
 class Bench:
@@ -54,6 +57,7 @@ class Bench:
         self._cluster: Cluster | None = None
         self._repeats_s = _REPEATS_S
         self._stop = StopRequest()
+        self._seen_alive = time.monotonic()
 
     @property
     def is_alone(self) -> bool:
@@ -80,7 +84,8 @@ class Bench:
     def run(self, points: Iterable[Point], title: str) -> list[Trial]:
         """Run whatever of `points` was not run before; how it went with each. `title` is for the progress bar.
 
-        Interrupted when a signal asked for it: what is finished by then stays.
+        What is finished stays, whatever ends this: Interrupted when a signal asked for it, RunError when all workers
+        are gone and none comes back.
         """
         wanted = list(points)
         unique = {point.key: point for point in wanted}
@@ -117,7 +122,9 @@ class Bench:
                     point = queue.popleft()
                     bar.update(task, now=str(point))
                     running[cluster.client.submit(execute, self._job(point), pure=False)] = point
-                for future in _finished(running):
+                finished = _finished(running)
+                self._check_alive(cluster, bool(finished))
+                for future in finished:
                     point = running.pop(future)
                     trials[point.key] = trial = self._outcome(future, point)
                     self._account(trial)
@@ -145,6 +152,17 @@ class Bench:
     def _account(self, trial: Trial) -> None:
         walls = [cost.wall_s for cost in trial.costs]
         self._repeats_s += _REPEATS * sum(walls[:1]) - sum(walls[1:])
+
+    def _check_alive(self, cluster: Cluster, works: bool) -> None:
+        """RunError where there has been no worker for long: nothing would ever be finished."""
+        now = time.monotonic()
+        if works or cluster.count:
+            self._seen_alive = now
+        elif now - self._seen_alive > _PATIENCE_S:
+            raise RunError(
+                f"there has been no worker for {_PATIENCE_S:g} s; what is finished is in {self.folder}: start workers, "
+                "and the same command goes on from there"
+            )
 
     def _started(self) -> Cluster:
         if self._cluster is None:

@@ -6,13 +6,14 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from cardiac_cosim.orchestrator.errors import InputError
+from cardiac_cosim.orchestrator.errors import InputError, RunError
 from cardiac_cosim.studies.bench import Bench
 from cardiac_cosim.studies.plan import plan_study
 
@@ -163,21 +164,9 @@ def test_several_at_the_same_time_come_to_the_same_and_are_compared_by_processor
 
 
 def test_the_workers_of_a_scheduler_do_it_as_well(study: Path, tmp_path: Path, charted: Callable[..., Any]) -> None:
-    address = tmp_path / "scheduler.json"
-    command = [
-        sys.executable,
-        "-c",
-        "import sys, time; from distributed import LocalCluster\n"
-        "if __name__ == '__main__':\n"
-        f"    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None)\n"
-        f"    open({str(address)!r}, 'w').write(cluster.scheduler_address)\n"
-        "    sys.stdin.read()\n",
-    ]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    address = tmp_path / "address"
+    process = _cluster_elsewhere(address)
     try:
-        begin = time.monotonic()
-        while not (address.is_file() and address.read_text()) and time.monotonic() - begin < 60.0:
-            time.sleep(0.05)
         there = charted(study, output="there", scheduler=address.read_text())
     finally:
         process.communicate(timeout=60)
@@ -198,3 +187,48 @@ def test_what_a_point_leaves_is_what_a_run_leaves(study: Path, tmp_path: Path, c
     assert summary["scenario"]["coupling"]["step_ms"] == 1
     assert len((folder / "timeseries.csv").read_text().splitlines()) == 42
     assert not (folder / "checkpoint.h5").exists()
+
+
+def test_a_study_whose_workers_are_all_gone_comes_to_an_end(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cardiac_cosim.studies.bench._PATIENCE_S", 1.0)
+    text = (tmp_path / "small_cell.yaml").read_text()
+    (tmp_path / "small_cell.yaml").write_text(text.replace("stop_ms: 40", "stop_ms: 400000"))
+    address = tmp_path / "address"
+    process = _cluster_elsewhere(address)
+    points = plan_study(study).points[-1:]
+    with Bench(tmp_path / "out", scheduler=address.read_text()) as bench:
+        # The worker goes as soon as it has begun.
+        watcher = threading.Thread(target=_kill_worker, args=(process, tmp_path / "out"))
+        watcher.start()
+        with pytest.raises(RunError, match="there has been no worker for 1 s"):
+            bench.run(points, "study")
+        watcher.join()
+    process.communicate(timeout=60)
+
+
+def _cluster_elsewhere(address: Path) -> "subprocess.Popen[bytes]":
+    """A cluster of one worker in another process, which ends when its input does; 'kill' there lets the worker die."""
+    text = (
+        "import sys; from distributed import LocalCluster\n"
+        "if __name__ == '__main__':\n"
+        "    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None)\n"
+        f"    open({str(address)!r}, 'w').write(cluster.scheduler_address)\n"
+        "    for line in sys.stdin:\n"
+        "        cluster.scale(0)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    begin = time.monotonic()
+    while not (address.is_file() and address.read_text()) and time.monotonic() - begin < 60.0:
+        time.sleep(0.05)
+    return process
+
+
+def _kill_worker(process: "subprocess.Popen[bytes]", out: Path) -> None:
+    begin = time.monotonic()
+    while not list(out.glob("points/*")) and time.monotonic() - begin < 60.0:
+        time.sleep(0.05)
+    assert process.stdin is not None
+    process.stdin.write(b"kill\n")
+    process.stdin.flush()
