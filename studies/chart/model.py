@@ -1,7 +1,8 @@
 """A chart: lines of points, each with its errors, its cost and whether it lies on the front."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any
 
 from ...orchestrator.results.comparison import Measure
@@ -11,13 +12,17 @@ from ..trial import Trial
 #: What a point costs: seconds of the wall clock where it ran alone, else of the processor.
 WALL, CPU = "wall_s", "cpu_s"
 
+#: The status of a point that was considered and not run, because it could not win.
+PRUNED = "pruned"
+
 
 @dataclass(frozen=True)
 class Row:
     """A point: its varied `settings`, how it went, its errors by measure, and the measures on whose front it lies.
 
     `errors` are infinite where only one of point and reference has the quantity, and lack what cannot be compared;
-    both have a `reason`. `trial` is None where the settings cannot stand together (`status` refused).
+    both have a `reason`. `trial` is None where the settings cannot stand together (`status` refused), and where the point
+    was not run (pruned).
     """
 
     settings: Mapping[str, Any]
@@ -44,10 +49,16 @@ class Row:
             found = found.get(part) if isinstance(found, Mapping) else None
         return found
 
+    def worst(self, limits: Mapping[str, float]) -> float:
+        """The largest error over its limit: at most 1 where all `limits` are kept; infinite where one is not known."""
+        if not self.is_done:
+            return inf
+        return max((self.errors.get(name, inf) / limit for name, limit in limits.items()), default=0.0)
+
     def cost(self, kind: str) -> float:
         """Seconds of the `kind` WALL or CPU; of points that are done."""
         if self.trial is None:
-            raise ValueError("a point that was refused has no cost")
+            raise ValueError("a point that was not run has no cost")
         return self.trial.wall_s if kind == WALL else self.trial.cpu_s
 
 
@@ -66,7 +77,7 @@ class ChartLine:
     @property
     def varied(self) -> list[str]:
         """The keys that change from point to point."""
-        return list(self.rows[0].settings) if self.rows else []
+        return list(dict.fromkeys(key for row in self.rows for key in row.settings))
 
 
 @dataclass(frozen=True)
@@ -74,7 +85,8 @@ class Chart:
     """A whole chart.
 
     `cost` is what points are compared by, WALL or CPU. `uncertainty` of the reference is known by measure where there
-    are two. `references` say what the points are compared with; `notes` are sentences for a person.
+    are two. `references` say what the points are compared with; `notes` are sentences for a person. `limits` are the
+    errors that are allowed, by measure, where any are.
     """
 
     name: str
@@ -87,6 +99,13 @@ class Chart:
     machine: Mapping[str, Any]
     versions: Mapping[str, str]
     notes: Sequence[str] = ()
+    limits: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def tried(self) -> "Chart":
+        """The same without the points that were considered and not run: what there is to be drawn."""
+        lines = [replace(line, rows=[row for row in line.rows if row.status != PRUNED]) for line in self.lines]
+        return replace(self, lines=[line for line in lines if line.rows])
 
     @property
     def rows(self) -> list[Row]:

@@ -1,4 +1,4 @@
-"""chart.csv, a row per point, and chart.json, what the numbers come from."""
+"""The tables of a chart: a CSV file with a row per point, and a JSON file with what the numbers come from."""
 
 import csv
 import io
@@ -11,19 +11,18 @@ from ...orchestrator.results.whole import write_whole
 from ..point import value_text
 from .model import Chart, Row
 
-CHART_CSV, CHART_JSON = "chart.csv", "chart.json"
 
 
-def write_tables(chart: Chart, folder: Path) -> None:
-    """Write both files to `folder`."""
+def write_tables(chart: Chart, folder: Path, stem: str = "chart") -> None:
+    """Write both files to `folder`, called after `stem`."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(_columns(chart))
     for line in chart.lines:
         for row in line.rows:
             writer.writerow([line.name, *_cells(chart, row)])
-    write_whole(folder / CHART_CSV, text.getvalue().encode())
-    write_whole(folder / CHART_JSON, f"{json.dumps(_content(chart), indent=2)}\n".encode())
+    write_whole(folder / f"{stem}.csv", text.getvalue().encode())
+    write_whole(folder / f"{stem}.json", f"{json.dumps(_content(chart), indent=2)}\n".encode())
 
 
 def _columns(chart: Chart) -> list[str]:
@@ -42,6 +41,7 @@ def _columns(chart: Chart) -> list[str]:
         *(f"solves_{unit}" for unit in chart.units),
         "sweeps",
         *(f"front_{name}" for name in names),
+        *(["meets", *(f"margin_{name}" for name in chart.limits)] if chart.limits else []),
         "folder",
     ]
 
@@ -55,12 +55,23 @@ def _cells(chart: Chart, row: Row) -> list[Any]:
         front = [0] * len(chart.measures)
         costs: list[Any] = [""] * (5 + 2 * len(chart.units))
         folder = "" if trial is None else trial.folder.name
-        return [*settings, row.status, row.reason, *errors, *costs, *front, folder]
+        return [*settings, row.status, row.reason, *errors, *costs, *front, *_margins(chart, row), folder]
     costs = [trial.wall_s, trial.wall_spread_s, len(trial.costs), trial.cpu_s]
     costs += [trial.unit_cpu_s(unit) if unit in trial.solves else "" for unit in chart.units]
     costs += [trial.solves.get(unit, "") for unit in chart.units]
     front = [int(measure.name in row.front) for measure in chart.measures]
-    return [*settings, row.status, row.reason, *errors, *costs, trial.sweeps, *front, trial.folder.name]
+    costs.append(trial.sweeps)
+    return [*settings, row.status, row.reason, *errors, *costs, *front, *_margins(chart, row), trial.folder.name]
+
+
+def _margins(chart: Chart, row: Row) -> list[Any]:
+    """Whether all limits are kept, and what part of each is left; less than nothing where it is exceeded."""
+    if not chart.limits:
+        return []
+    if not row.is_done:
+        return ["", *("" for _ in chart.limits)]
+    left = [1.0 - row.errors[name] / limit if name in row.errors else "" for name, limit in chart.limits.items()]
+    return [int(row.worst(chart.limits) <= 1.0), *left]
 
 
 def _setting(row: Row, key: str) -> str:
@@ -80,4 +91,5 @@ def _content(chart: Chart) -> dict[str, Any]:
         "measures": {measure.name: {"unit": measure.unit, "what": measure.description} for measure in chart.measures},
         "orders": {line.name: dict(line.orders) for line in chart.lines},
         "notes": list(chart.notes),
+        **({"limits": dict(chart.limits)} if chart.limits else {}),
     }

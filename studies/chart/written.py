@@ -8,8 +8,11 @@ from .page import write_page
 from .table import write_tables
 
 
-def write_chart(chart: Chart, folder: Path) -> None:
-    """Write chart.csv, chart.json, chart.png, chart.svg and chart.html to `folder`."""
-    write_tables(chart, folder)
-    write_figures(chart, folder)
-    write_page(chart, folder)
+def write_chart(chart: Chart, folder: Path, stem: str = "chart") -> None:
+    """Write chart.csv, chart.json, chart.png, chart.svg and chart.html to `folder`, or the same called after `stem`.
+
+    What was considered and not run stands in the tables, and is not drawn.
+    """
+    write_tables(chart, folder, stem)
+    write_figures(chart.tried, folder, stem)
+    write_page(chart.tried, folder, stem)
