@@ -1,4 +1,4 @@
-"""`cosim chart` and `cosim errors`: studies, which run scenarios many times."""
+"""`cosim chart`, `cosim tune` and `cosim errors`: studies, which run scenarios many times."""
 
 import sys
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from ..orchestrator.errors import InputError, Interrupted
+from ..orchestrator.errors import InputError, Interrupted, RunError
 from .exit_codes import INTERRUPTED
 from .scenario_file import Assignments, ScenarioFile, about, opened, variants
 
@@ -62,6 +62,63 @@ def chart(
         typer.echo(f"note: {note}", err=True)
     typer.echo(charted.summary())
     typer.echo(f"  chart in {folder}")
+
+
+def tune(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file.")],
+    tolerances: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--tolerance",
+            metavar="MEASURE=LIMIT",
+            help="The largest error that is allowed, in the measure's unit of measure; may be repeated.",
+        ),
+    ] = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(help="Choose among the points of this study, and compare with its reference."),
+    ] = None,
+    mesh: Annotated[bool, typer.Option("--mesh", help="Vary the mesh too, and compare with a finer one.")] = False,
+    output: Annotated[
+        Path | None, typer.Option(help="Folder of the results; default results/<name>.tune, or the study's.")
+    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    assignments: Assignments = None,
+) -> None:
+    """Find the cheapest setting of a scenario that keeps the tolerances, and write it as a scenario that runs.
+
+    Only what may win is run, and once; a search that was interrupted goes on where it stopped.
+    """
+    # Imported here, so that help does not wait for numerical libraries.
+    from ..orchestrator.scenario import load_scenario
+    from ..studies.bench import Bench
+    from ..studies.plan import plan_study
+    from ..studies.tuning import parsed_tolerances, summary, tune_scenario, tune_study, write_tuning
+
+    _one_of(workers, scheduler)
+    limits = parsed_tolerances(tolerances or [])
+    if file.suffix.lower() == ".ssp":
+        raise InputError(f"{file}: a tuned scenario is written as a YAML file, so tuning begins with one; give that")
+    if study is not None and mesh:
+        raise InputError("--mesh: a study says by itself what is varied, meshes included; leave --mesh or --study out")
+    plan = None if study is None else plan_study(study, assignments or [])
+    name = load_scenario(file, assignments or []).name
+    folder = output or Path("results") / (f"{name}.tune" if plan is None else plan.study.name)
+    console = Console(stderr=True)
+    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+        if plan is None:
+            tuning = tune_scenario(file, limits, bench, assignments or [], mesh)
+        else:
+            tuning = tune_study(plan, file, limits, bench, assignments or [])
+        with console.status("drawing the chart"):
+            path = write_tuning(tuning, folder)
+    for note in tuning.chart.notes:
+        typer.echo(f"note: {note}", err=True)
+    if path is None:
+        raise RunError(f"{summary(tuning)}; all that was run is in {folder / 'tune.csv'}")
+    typer.echo(summary(tuning))
+    typer.echo(f"  tuned scenario: {path}\n  all that was considered: {folder / 'tune.csv'}")
 
 
 def errors(

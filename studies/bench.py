@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
@@ -19,7 +20,7 @@ from ..orchestrator.errors import InputError, Interrupted, RunError
 from ..orchestrator.results.lock import FolderLock
 from ..orchestrator.results.origin import program
 from ..orchestrator.stopping import StopRequest
-from .execution import Job, execute
+from .execution import Job, execute, time_once
 from .point import Point
 from .trial import CRASHED, Trial, read_trial
 
@@ -95,6 +96,30 @@ class Bench:
             self._run(missing, len(unique), title, trials)
         return [trials[point.key] for point in wanted]
 
+    @property
+    def places(self) -> int:
+        """How many points run at the same time."""
+        return (self._workers or 1) if self._scheduler is None else len(self._started().workers)
+
+    def time_in_turn(self, points: Sequence[Point], runs: int, title: str) -> list[Trial]:
+        """Run points again that are done, one after the other and round by round, until each has so many runs.
+
+        What the machine does meanwhile meets all of them alike. The trials with the costs of all their runs.
+        """
+        trials = {point.key: trial for point, trial in zip(points, self.run(points, title), strict=True)}
+        unique = {point.key: point for point in points}
+        missing = {key: max(runs - len(trials[key].costs), 0) for key in unique if trials[key].is_done}
+        bar = self._bar(title)
+        task = bar.add_task(title, total=sum(missing.values()), now="")
+        with bar:
+            while any(missing.values()):
+                for key in [key for key, count in missing.items() if count]:
+                    bar.update(task, now=str(unique[key]))
+                    self._time(unique[key], trials)
+                    missing[key] -= 1
+                    bar.advance(task)
+        return [trials[point.key] for point in points]
+
     # --- inside -------------------------------------------------------------------------------------------------------
 
     def _clear(self) -> None:
@@ -105,15 +130,7 @@ class Bench:
 
     def _run(self, points: Sequence[Point], count: int, title: str, trials: dict[str, Trial]) -> None:
         queue, running = deque(points), dict[Future, Point]()
-        bar = Progress(
-            TextColumn(f"[bold]{title}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[now]}"),
-            TimeElapsedColumn(),
-            console=self._console,
-            disable=not self._console.is_terminal,
-        )
+        bar = self._bar(title)
         task = bar.add_task(title, total=count, completed=count - len(points), now="")
         with bar:
             cluster = self._started()
@@ -131,6 +148,31 @@ class Bench:
                     bar.advance(task)
                 if self._stop.signal is not None:
                     raise Interrupted(self._stop.signal)
+
+    def _bar(self, title: str) -> Progress:
+        return Progress(
+            TextColumn(f"[bold]{title}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[now]}"),
+            TimeElapsedColumn(),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
+
+    def _time(self, point: Point, trials: dict[str, Trial]) -> None:
+        future = self._started().client.submit(time_once, self._job(point), pure=False)
+        while not _finished([future]):
+            if self._stop.signal is not None:
+                raise Interrupted(self._stop.signal)
+        try:
+            cost = future.result()
+        except KilledWorker:
+            raise RunError(f"the process that ran {point} again died; start the same command again") from None
+        finally:
+            future.release()
+        trials[point.key] = trial = replace(trials[point.key], costs=(*trials[point.key].costs, cost))
+        trial.write()
 
     def _job(self, point: Point) -> Job:
         scratch = (self.folder / _SCRATCH).absolute()

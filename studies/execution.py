@@ -65,6 +65,20 @@ def _keep(scratch: Path) -> None:
     keep_unpacked(Path(mkdtemp(dir=scratch)))
 
 
+def time_once(job: Job) -> Cost:
+    """Run a point that was done once more, for what it costs; its results are kept nowhere."""
+    with _busy:
+        _keep(job.scratch)
+        _warm_up(job)
+        return _again(job)
+
+
+def _again(job: Job) -> Cost:
+    with TemporaryDirectory(dir=job.scratch) as folder:
+        run_scenario(job.scenario, job.base, Path(folder), mesh_of=_kept_mesh)
+        return _cost(Path(folder))
+
+
 def _tried(job: Job) -> Trial:
     _warm_up(job)
     try:
@@ -83,9 +97,7 @@ def _tried(job: Job) -> Trial:
     summary = StoredRun(job.folder).summary
     costs = [_cost(job.folder)]
     while len(costs) < _RUNS and costs[0].wall_s < _SHORT_S and sum(cost.wall_s for cost in costs[1:]) < job.repeats_s:
-        with TemporaryDirectory(dir=job.scratch) as folder:
-            run_scenario(job.scenario, job.base, Path(folder), mesh_of=_kept_mesh)
-            costs.append(_cost(Path(folder)))
+        costs.append(_again(job))
     return Trial(job.folder, DONE, "", tuple(costs), summary["solves"], summary["sweeps"], job.alone)
 
 

@@ -11,6 +11,7 @@ from .file import (
     with_settings,
 )
 from .model import ConnectionEntry, Coupling, Iterate, Scenario, Scene, UnitEntry
+from .rewritten import rewritten
 
 __all__ = [
     "ConnectionEntry",
@@ -24,6 +25,7 @@ __all__ = [
     "file_content",
     "load_scenario",
     "parsed_assignment",
+    "rewritten",
     "scenario_content",
     "validated",
     "with_settings",

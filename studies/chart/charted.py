@@ -1,7 +1,5 @@
 """From a plan to a chart: references and points run, compared and ranked."""
 
-from collections.abc import Sequence
-
 from ...orchestrator.errors import InputError, did_you_mean
 from ...orchestrator.results.comparison import Measure, measures
 from ...orchestrator.results.stored_run import StoredRun

@@ -1,4 +1,4 @@
-"""Points compared with a reference: their errors, fronts and orders, for a chart and for whoever searches among them."""
+"""Points compared with a reference: their errors, fronts and orders, for a chart and for a search among them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -21,8 +21,8 @@ class Row:
     """A point: its varied `settings`, how it went, its errors by measure, and the measures on whose front it lies.
 
     `errors` are infinite where only one of point and reference has the quantity, and lack what cannot be compared;
-    both have a `reason`. `trial` is None where the settings cannot stand together (`status` refused), and where the point
-    was not run (pruned).
+    both have a `reason`. `trial` is None where the settings cannot stand together (`status` refused), and where the
+    point was not run (pruned).
     """
 
     settings: Mapping[str, Any]

@@ -12,7 +12,6 @@ from ..point import value_text
 from .model import Chart, Row
 
 
-
 def write_tables(chart: Chart, folder: Path, stem: str = "chart") -> None:
     """Write both files to `folder`, called after `stem`."""
     text = io.StringIO(newline="")

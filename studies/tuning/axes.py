@@ -1,0 +1,112 @@
+"""How finely the units solve inside, and on which mesh: axes of a search, whose levels go from coarse to fine."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ...orchestrator.participants.accuracy import AccuracyParameter
+from ...orchestrator.participants.native import accuracy_parameters
+from ...orchestrator.scenario import Scenario
+
+#: What the scenario's own internal steps and tolerances are multiplied by, coarse to fine.
+_FACTORS = {"step": (4.0, 2.0, 1.0, 0.5), "tolerance": (100.0, 10.0, 1.0, 0.1)}
+
+#: Parameters that are varied independently of each other; of more, those of a kind are varied together.
+_MOST_APART = 3
+
+#: Sizes of the elements over the scenario's, coarse to fine.
+_SIZES = (2.0, 1.5, 1.25, 1.0, 0.8, 0.65)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """`levels` are settings, from the coarsest to the finest; the scenario's own are at the place `own`.
+
+    `is_step` says whether they are internal time steps.
+    """
+
+    name: str
+    levels: Sequence[Mapping[str, Any]]
+    own: int
+    is_step: bool = False
+
+
+@dataclass(frozen=True)
+class Internal:
+    """A parameter that decides a unit's numerical error: its `key` in the scenario, and the value that it has there."""
+
+    key: str
+    declared: AccuracyParameter
+    own: float
+
+    def times(self, factor: float) -> float:
+        """The own value times `factor`, as far as there is no limit to it."""
+        return limited(self.declared, self.own * factor)
+
+
+def internals(scenario: Scenario, *kinds: str) -> list[Internal]:
+    """The parameters of these kinds (`step`, `tolerance`, `mesh`) of all units, in the order of the scenario."""
+    return [
+        Internal(
+            f"units.{name}.parameters.{declared.name}", declared, entry.parameters.get(declared.name, declared.default)
+        )
+        for name, entry in scenario.units.items()
+        if entry.unit is not None
+        for declared in accuracy_parameters(entry.unit).values()
+        if declared.kind in kinds
+    ]
+
+
+def limited(declared: AccuracyParameter, value: float) -> float:
+    """`value`, or the lower limit of the parameter where that is above it; rounded to what a person would write."""
+    rounded = float(f"{value:.6g}")
+    if declared.limit_is_allowed:
+        return max(rounded, declared.lower_limit)
+    return rounded if rounded > declared.lower_limit else float(declared.default)
+
+
+def accuracy_axes(scenario: Scenario, together: bool = False) -> list[Axis]:
+    """An axis for each internal step and tolerance of the units; of many, or `together`, one for all of a kind."""
+    every = {kind: internals(scenario, kind) for kind in _FACTORS}
+    if together or sum(map(len, every.values())) > _MOST_APART:
+        return [_axis(f"every internal {kind}", found, kind) for kind, found in every.items() if found]
+    return [_axis(each.key, [each], kind) for kind, found in every.items() for each in found]
+
+
+def mesh_axes(scenario: Scenario) -> list[Axis]:
+    """The size or refinement of the scene's mesh, and the nested refinement of each unit; none without a scene."""
+    if scenario.scene is None:
+        return []
+    refine, axes = scenario.scene.refine, []
+    if scenario.scene.mesh is None:
+        size = scenario.scene.mesh_size_mm
+        sizes = [float(f"{size * factor:.3g}") if factor != 1.0 else size for factor in _SIZES]
+        axes.append(Axis("scene.mesh_size_mm", [{"scene.mesh_size_mm": each} for each in sizes], _SIZES.index(1.0)))
+    elif refine:
+        levels = [{"scene.refine": level} for level in range(refine + 1)]
+        axes.append(Axis("scene.refine", levels, refine))
+    for each in internals(scenario, "mesh"):
+        levels = [{each.key: level} for level in range(int(each.own) + 2)]
+        axes.append(Axis(each.key, levels, int(each.own)))
+    return axes
+
+
+def _axis(name: str, found: Sequence[Internal], kind: str) -> Axis:
+    own = {each.key: each.own for each in found}
+    levels: list[dict[str, Any]] = []
+    for factor in _FACTORS[kind]:
+        level = own if factor == 1.0 else {each.key: each.times(factor) for each in found}
+        if level not in levels:
+            levels.append(level)
+    return Axis(name, levels, levels.index(own), kind == "step")
+
+
+def combined(axes: Sequence[Axis]) -> Iterator[tuple[dict[str, Any], dict[str, float], bool]]:
+    """Every combination of levels: its settings, the place on each axis, and whether it is the scenario's own."""
+    if not axes:
+        yield {}, {}, True
+        return
+    first, *others = axes
+    for place, level in enumerate(first.levels):
+        for settings, places, is_own in combined(others):
+            yield {**level, **settings}, {first.name: float(place), **places}, is_own and place == first.own

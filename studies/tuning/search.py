@@ -1,0 +1,176 @@
+"""The search for the cheapest candidate that keeps all tolerances, by as few runs as certainty allows.
+
+Candidates of one group are ordered by how finely they compute: one that is nowhere coarser than another and somewhere
+finer costs no less. From that alone follows most of what need not be run:
+
+- a candidate that is finer than one that keeps the tolerances, for it costs more than that one;
+- a candidate that is finer than one that costs more than the best so far, whether that one keeps them or not.
+
+So the cheap, coarse ones are run first. The third reason is about errors. Candidates may follow a *lead*: the one that
+differs from them only in what matters little unless the lead is nearly good enough. If that one misses a tolerance by
+more than a factor, those that follow it are not run.
+"""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
+
+#: Costs nearer than this to each other are taken for equal: seconds of a machine repeat themselves no better.
+NOISE = 0.1
+
+#: By what factor a lead may miss a tolerance, so that those that follow it are still run.
+_NEARLY = 3.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate as the search sees it.
+
+    `name` is for reasons. Candidates of one `group` are ordered by their `coordinates`, which grow as a setting becomes
+    finer and dearer. Those of a lower `phase` come first; `leads` are the names of those that it follows.
+    """
+
+    name: str
+    group: Hashable
+    coordinates: Mapping[str, float] = field(default_factory=dict)
+    phase: int = 0
+    leads: tuple[str, ...] = ()
+
+    def is_finer(self, other: "Candidate") -> bool:
+        """Whether it is nowhere coarser than `other`, and somewhere finer."""
+        if self.group != other.group or self.coordinates.keys() != other.coordinates.keys():
+            return False
+        pairs = [(value, other.coordinates[key]) for key, value in self.coordinates.items()]
+        return all(own >= theirs for own, theirs in pairs) and any(own > theirs for own, theirs in pairs)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a candidate costs, in seconds, and its largest error over the tolerance for it: at most 1 is good enough."""
+
+    cost_s: float
+    worst: float
+
+    @property
+    def meets(self) -> bool:
+        """Whether all tolerances are kept."""
+        return self.worst <= 1.0
+
+
+class Search:
+    """Ask for what to run `next`, `tell` how it went, until there is nothing left.
+
+    Attributes
+    ----------
+    outcomes:
+        How it went, by the candidate's place in `candidates`; None for one without results.
+    pruned:
+        Why a candidate is not run, by its place.
+    """
+
+    def __init__(self, candidates: Sequence[Candidate]) -> None:
+        self.candidates = candidates
+        self.outcomes: dict[int, Outcome | None] = {}
+        self.pruned: dict[int, str] = {}
+        self._open = set(range(len(candidates)))
+        self._places = {candidate.name: place for place, candidate in enumerate(candidates)}
+        # Coarser candidates of each, and how much each costs at least.
+        self._coarser = _coarser(candidates)
+        self._floor = dict.fromkeys(self._open, 0.0)
+
+    @property
+    def best(self) -> int | None:
+        """The cheapest so far that keeps all tolerances."""
+        meeting = [place for place, outcome in self.outcomes.items() if outcome is not None and outcome.meets]
+        return min(meeting, key=self._cost, default=None)
+
+    def next(self, most: int = 1) -> list[int]:
+        """Up to `most` candidates to be run now, those that may be cheapest first; none when the search is over."""
+        self._prune()
+        if not self._open:
+            return []
+        phase = min(self.candidates[place].phase for place in self._open)
+        now = [place for place in self._open if self.candidates[place].phase == phase]
+        ready = [place for place in now if not any(coarser in now for coarser in self._coarser[place])]
+        return sorted(ready, key=lambda place: (self._floor[place], place))[:most]
+
+    def tell(self, place: int, outcome: Outcome | None) -> None:
+        """How it went with a candidate; None if it has no results."""
+        self.outcomes[place] = outcome
+        self._open.discard(place)
+
+    def finalists(self, within: float, most: int) -> list[int]:
+        """The candidates that keep all tolerances and cost hardly more than the best, cheapest first, so many at most.
+
+        `within` is the part of the best's cost by which theirs may exceed it.
+        """
+        best = self.best
+        if best is None:
+            return []
+        meeting = [place for place, outcome in self.outcomes.items() if outcome is not None and outcome.meets]
+        near = [place for place in meeting if self._cost(place) <= (1.0 + within) * self._cost(best)]
+        return sorted(near, key=self._cost)[:most]
+
+    def nearest(self) -> int | None:
+        """The candidate with the smallest worst error over tolerance, whether it meets them or not."""
+        done = [place for place, outcome in self.outcomes.items() if outcome is not None and outcome.worst < inf]
+        return min(done, key=self._worst, default=None)
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _prune(self) -> None:
+        best = self.best
+        for place in sorted(self._open):
+            reason = self._reason(place, best)
+            if reason:
+                self.pruned[place] = reason
+                self._open.discard(place)
+
+    def _reason(self, place: int, best: int | None) -> str:
+        for lead in self.candidates[place].leads:
+            reason = self._hopeless(self._places[lead])
+            if reason:
+                return reason
+        for coarser in self._coarser[place]:
+            outcome = self.outcomes.get(coarser)
+            if outcome is None:
+                continue
+            self._floor[place] = max(self._floor[place], outcome.cost_s)
+            name = self.candidates[coarser].name
+            if outcome.meets:
+                return f"it is finer than a point that meets all tolerances, and so costs more: {name}"
+            if best is not None and outcome.cost_s > (1.0 + NOISE) * self._cost(best):
+                return (
+                    f"it is finer than a point that costs {outcome.cost_s:.3g} s ({name}), while one that meets all "
+                    f"tolerances costs {self._cost(best):.3g} s ({self.candidates[best].name})"
+                )
+        return ""
+
+    def _hopeless(self, lead: int) -> str:
+        """Why those that follow a lead cannot be good enough; empty if they may be."""
+        name = self.candidates[lead].name
+        if lead in self.outcomes:
+            outcome = self.outcomes[lead]
+            if outcome is not None and outcome.worst > _NEARLY:
+                by = f"by a factor of {outcome.worst:.3g}" if outcome.worst < inf else "altogether"
+                return f"it differs little from a point that misses the tolerances {by}: {name}"
+        return ""
+
+    def _cost(self, place: int) -> float:
+        outcome = self.outcomes[place]
+        return inf if outcome is None else outcome.cost_s
+
+    def _worst(self, place: int) -> float:
+        outcome = self.outcomes[place]
+        return inf if outcome is None else outcome.worst
+
+
+def _coarser(candidates: Sequence[Candidate]) -> dict[int, list[int]]:
+    groups: dict[Hashable, list[int]] = {}
+    for place, candidate in enumerate(candidates):
+        groups.setdefault(candidate.group, []).append(place)
+    return {
+        place: [other for other in group if candidates[place].is_finer(candidates[other])]
+        for group in groups.values()
+        for place in group
+    }
