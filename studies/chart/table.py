@@ -74,8 +74,9 @@ def _margins(chart: Chart, row: Row) -> list[Any]:
 
 
 def _setting(row: Row, key: str) -> str:
-    """A varied value; of a line that does not vary the key what its scenario has there."""
-    return value_text(row.settings[key]) if key in row.settings else value_text(row.value(key)) if row.trial else ""
+    """A varied value; of a line that does not vary the key what its scenario has there, if it says anything."""
+    value = row.settings.get(key, row.value(key))
+    return value_text(value) if key in row.settings or value is not None else ""
 
 
 def _content(chart: Chart) -> dict[str, Any]:

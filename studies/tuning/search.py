@@ -46,10 +46,14 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a candidate costs, in seconds, and its largest error over the tolerance for it: at most 1 is good enough."""
+    """What a candidate costs, in seconds, and its largest error over the tolerance for it: at most 1 is good enough.
+
+    Its cost is at least `floor_s`, whatever disturbed the machine when it was measured.
+    """
 
     cost_s: float
     worst: float
+    floor_s: float
 
     @property
     def meets(self) -> bool:
@@ -100,16 +104,23 @@ class Search:
         self._open.discard(place)
 
     def finalists(self, within: float, most: int) -> list[int]:
-        """The candidates that keep all tolerances and cost hardly more than the best, cheapest first, so many at most.
+        """The candidates that keep all tolerances and may cost no more than the best does, cheapest first.
 
-        `within` is the part of the best's cost by which theirs may exceed it.
+        `within` is the part of the best's cost by which the least that is known of theirs may exceed it; so many at
+        most.
         """
         best = self.best
         if best is None:
             return []
-        meeting = [place for place, outcome in self.outcomes.items() if outcome is not None and outcome.meets]
-        near = [place for place in meeting if self._cost(place) <= (1.0 + within) * self._cost(best)]
+        meeting = {place: outcome for place, outcome in self.outcomes.items() if outcome is not None and outcome.meets}
+        limit = (1.0 + within) * meeting[best].cost_s
+        near = [place for place, outcome in meeting.items() if outcome.floor_s <= limit]
         return sorted(near, key=self._cost)[:most]
+
+    def reconsider(self) -> None:
+        """Judge all that was pruned again: what is known of costs has changed."""
+        self._open.update(self.pruned)
+        self.pruned.clear()
 
     def nearest(self) -> int | None:
         """The candidate with the smallest worst error over tolerance, whether it meets them or not."""
@@ -135,13 +146,13 @@ class Search:
             outcome = self.outcomes.get(coarser)
             if outcome is None:
                 continue
-            self._floor[place] = max(self._floor[place], outcome.cost_s)
+            self._floor[place] = max(self._floor[place], outcome.floor_s)
             name = self.candidates[coarser].name
             if outcome.meets:
                 return f"it is finer than a point that meets all tolerances, and so costs more: {name}"
-            if best is not None and outcome.cost_s > (1.0 + NOISE) * self._cost(best):
+            if best is not None and outcome.floor_s > (1.0 + NOISE) * self._cost(best):
                 return (
-                    f"it is finer than a point that costs {outcome.cost_s:.3g} s ({name}), while one that meets all "
+                    f"it is finer than a point that costs {outcome.floor_s:.3g} s ({name}), while one that meets all "
                     f"tolerances costs {self._cost(best):.3g} s ({self.candidates[best].name})"
                 )
         return ""

@@ -21,7 +21,8 @@ from .references import references_of
 from .search import Outcome, Search
 from .tolerances import chosen_measures
 
-#: Points whose cost is within this part of the best's are timed again in turn, so many of them, to so many runs each.
+#: Points whose cost is within this part of the best's are timed again in turn, with the scenario as it is: so many of
+#: them, to so many runs each.
 _NEAR, _FINALISTS, _RUNS = 0.08, 4, 7
 
 #: The part of a tolerance that the reference may err by itself.
@@ -148,9 +149,16 @@ class _Tuner:
         for place, option in enumerate(self._options):
             if option.point is None:
                 self._tell(place, self._comparison.row(option.shown, None, option.reason))
-        while places := self._search.next(self._bench.places):
-            self._run(places)
-        self._time_again(self._search.finalists(_NEAR, _FINALISTS))
+        timed: set[int] = set()
+        while True:
+            while places := self._search.next(self._bench.places):
+                self._run(places)
+            finalists = self._search.finalists(_NEAR, _FINALISTS)
+            if timed.issuperset(finalists):
+                break
+            timed.update(finalists)
+            self._time_again(finalists, task.own)
+            self._search.reconsider()
         for place, reason in self._search.pruned.items():
             self._rows[place] = self._comparison.row(self._options[place].shown, None, reason, PRUNED)
         rows = [self._rows[place] for place in range(len(self._options))]
@@ -164,18 +172,21 @@ class _Tuner:
         for place, trial in zip(places, trials, strict=True):
             self._tell(place, self._comparison.row(self._options[place].shown, trial))
 
-    def _time_again(self, places: Sequence[int]) -> None:
-        """Decide between those that cost nearly the same by more runs."""
-        points = [self._point(place) for place in places]
-        if len({point.key for point in points}) < 2:
-            return
-        trials = self._bench.time_in_turn(points, _RUNS, "timing the best again")
-        for place, trial in zip(places, trials, strict=True):
+    def _time_again(self, places: Sequence[int], own: Point) -> None:
+        """Decide between those that cost nearly the same, and tell what they save, by more runs of them in turn."""
+        trials = self._bench.time_in_turn(
+            [own, *(self._point(place) for place in places)], _RUNS, "timing the best again"
+        )
+        for place, trial in zip(places, trials[1:], strict=True):
             self._tell(place, self._comparison.row(self._options[place].shown, trial))
 
     def _tell(self, place: int, row: Row) -> None:
         self._rows[place] = row
-        outcome = Outcome(row.cost(self._cost), row.worst(self._comparison.limits)) if row.is_done else None
+        outcome = None
+        if row.is_done and row.trial is not None:
+            # A machine that is busy with something else adds to the wall clock, and little to the processor's.
+            floor = min(min(cost.wall_s, cost.cpu_s) for cost in row.trial.costs)
+            outcome = Outcome(row.cost(self._cost), row.worst(self._comparison.limits), floor)
         self._search.tell(place, outcome)
 
     def _point(self, place: int) -> Point:
