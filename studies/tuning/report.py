@@ -5,7 +5,7 @@ from math import isfinite
 from ..chart import Row
 from ..chart.model import WALL
 from ..point import told
-from .tuning import Tuning
+from .result import Tuning
 
 
 def kept(tuning: Tuning) -> str:
@@ -42,9 +42,19 @@ def summary(tuning: Tuning) -> str:
         f"{tuning.task.scenario.name}: {option.line}, {told(option.shown)}",
         f"  keeps {kept(tuning)}: {errors_told(tuning, row)}",
         f"  costs {compared_costs(tuning, tuning.best)} ({errors_told(tuning, tuning.own)})",
+        *([_longer(tuning, tuning.longer)] if tuning.longer is not None else []),
         f"  {_count(tuning)}",
     ]
     return "\n".join(lines)
+
+
+def _longer(tuning: Tuning, row: Row) -> str:
+    own, cost = tuning.own.cost(tuning.cost), row.cost(tuning.cost)
+    return (
+        f"  with output.every_ms={row.settings['output.every_ms']:g} and steps as long it would cost {cost:.3g} s, "
+        f"{own / cost:.2g} times less than the scenario as it is ({errors_told(tuning, row)}); the tuned scenario "
+        "keeps the output interval"
+    )
 
 
 def _count(tuning: Tuning) -> str:

@@ -10,7 +10,7 @@ from ..chart import write_chart
 from ..machine import machine
 from ..point import value_text
 from .report import compared_costs, errors_told, kept
-from .tuning import Tuning
+from .result import Tuning
 
 #: Columns of a comment.
 _WIDTH = 118
