@@ -19,6 +19,9 @@ from .ticks import set_ticks
 FRONT: dict[str, Any] = {"color": "0.83", "linewidth": 4.0, "solid_capstyle": "butt", "solid_joinstyle": "miter"}
 BAND: dict[str, Any] = {"facecolor": "0.95", "edgecolor": "0.82", "hatch": "///", "linewidth": 0.0}
 
+#: The tolerance.
+LIMIT: dict[str, Any] = {"color": "black", "linewidth": 1.0, "linestyle": (0, (5, 3))}
+
 #: A point without a result, and the arrows of errors that have no place on the axis.
 CROSS: dict[str, Any] = {
     "marker": "x",
@@ -77,6 +80,7 @@ def draw_panel(axis: Axes, panel: Panel, lines: Sequence[ChartLine], notes: Foot
         axis.set_yticks([])
         axis.set_yticks([], minor=True)
     _draw_uncertainty(axis, panel)
+    _draw_limit(axis, panel)
     across, up = panel.stairs()
     axis.plot(across, up, label="front", zorder=1.0, **FRONT)
     obstacles = []
@@ -118,6 +122,11 @@ def _draw_uncertainty(axis: Axes, panel: Panel) -> None:
     if panel.uncertainty is not None and panel.uncertainty > panel.errors[0]:
         top = min(panel.uncertainty, panel.errors[1])
         axis.axhspan(panel.errors[0], top, label="uncertainty of the reference", zorder=0.5, **BAND)
+
+
+def _draw_limit(axis: Axes, panel: Panel) -> None:
+    if panel.limit is not None and panel.errors[0] < panel.limit < panel.errors[1]:
+        axis.axhline(panel.limit, label="tolerance", zorder=0.6, **LIMIT)
 
 
 def _draw_spot(

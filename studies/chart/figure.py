@@ -65,8 +65,8 @@ def draw(chart: Chart) -> Figure:
     return figure
 
 
-def write_figures(chart: Chart, folder: Path) -> list[Path]:
-    """Write `chart.png` and `chart.svg` into `folder`; returns the files."""
+def write_figures(chart: Chart, folder: Path, stem: str = "chart") -> list[Path]:
+    """Write `chart.png` and `chart.svg` into `folder`, or the same called after `stem`; returns the files."""
     figure = draw(chart)
     FigureCanvasAgg(figure)
     written = []
@@ -75,7 +75,7 @@ def write_figures(chart: Chart, folder: Path) -> list[Path]:
         for kind, metadata in (("png", {}), ("svg", {"Date": None})):
             content = io.BytesIO()
             figure.savefig(content, format=kind, dpi=_DOTS_PER_INCH, metadata=metadata)
-            written.append(folder / f"chart.{kind}")
+            written.append(folder / f"{stem}.{kind}")
             write_whole(written[-1], content.getvalue())
     return written
 
@@ -140,7 +140,7 @@ def _below(chart: Chart, notes: Footnotes, width: float) -> list[str]:
     texts = [f"{number}: {text}" for number, text in enumerate(notes.texts, start=1)]
     if len(texts) > _MOST_NOTES:
         left_out = len(texts) - _MOST_NOTES
-        texts = [*texts[:_MOST_NOTES], f"{left_out} more reasons stand in chart.html and chart.csv."]
+        texts = [*texts[:_MOST_NOTES], f"{left_out} more reasons stand in the table and on the page of this chart."]
     caption = [reference_text(chart), cost_text(chart)]
     if any(line.orders for line in chart.lines):
         caption.append(

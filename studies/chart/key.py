@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from .caption import uncertainty_text
-from .drawing import BAND, CROSS, FRONT, INFINITE, ZERO, line_style, marker, without_cost
+from .drawing import BAND, CROSS, FRONT, INFINITE, LIMIT, ZERO, line_style, marker, without_cost
 from .labels import SIZE as LABEL_SIZE
 from .lettering import broken, name_lines, plain, width_in
 from .model import Chart
@@ -42,7 +42,7 @@ class Entry:
 
 
 def line_entries(chart: Chart, panel: Panel, width_in: float) -> list[Entry]:
-    """The lines of a chart with their orders for this panel's measure, and the uncertainty of the reference."""
+    """The lines of a chart with their orders for this panel's measure, the reference's uncertainty and the tolerance."""
     room = width_in - _SAMPLE_IN - 0.1
     entries = []
     same = _same_varied(chart)
@@ -59,6 +59,9 @@ def line_entries(chart: Chart, panel: Panel, width_in: float) -> list[Entry]:
     if panel.uncertainty is not None:
         text = f"uncertainty of the reference: {uncertainty_text(panel)}"
         entries.append(Entry(_band_sample, broken(text, _SIZE, room), []))
+    if panel.limit is not None:
+        text = f"tolerance: {panel.limit:g} {panel.measure.unit}".rstrip()
+        entries.append(Entry(_stroke(**LIMIT), broken(text, _SIZE, room), []))
     return entries
 
 

@@ -26,9 +26,9 @@ th { background: #f2f2f2; position: sticky; top: 0 }
 """
 
 
-def write_page(chart: Chart, folder: Path) -> Path:
-    """Write `chart.html` into `folder`; returns the file."""
-    path = folder / "chart.html"
+def write_page(chart: Chart, folder: Path, stem: str = "chart") -> Path:
+    """Write `chart.html` into `folder`, or the same called after `stem`; returns the file."""
+    path = folder / f"{stem}.html"
     write_whole(path, page(chart).encode())
     return path
 

@@ -77,7 +77,8 @@ class Panel:
     """One measure over one view; `spots` are those of each line, in the order of the study.
 
     `costs` and `errors` are the limits of the axes. `has_scale` is false where no error is a positive number, so that
-    the axis of errors has nothing to tell. `uncertainty` of the reference is None where it is not known.
+    the axis of errors has nothing to tell. `uncertainty` of the reference is None where it is not known, and so is the
+    `limit` on the error, where there is none.
     """
 
     measure: Measure
@@ -87,6 +88,7 @@ class Panel:
     errors: tuple[float, float]
     has_scale: bool
     uncertainty: float | None
+    limit: float | None = None
 
     @property
     def front(self) -> list[Spot]:
@@ -134,9 +136,10 @@ def panel(chart: Chart, measure: Measure, view: View) -> Panel:
         spots[number].append(Spot(row, cost, error, is_on))
     known = [error for error in errors if isfinite(error) and error > 0.0]
     uncertainty = chart.uncertainty.get(measure.name)
-    heights = known + _worth_showing(uncertainty, known)
+    limit = chart.limits.get(measure.name)
+    heights = known + _worth_showing(uncertainty, known) + _worth_showing(limit, known)
     widths = [each for _, row in rows for each in view.extent(row) or ()] + costs
-    return Panel(measure, view, spots, _limits(widths), _limits(heights), bool(heights), uncertainty)
+    return Panel(measure, view, spots, _limits(widths), _limits(heights), bool(heights), uncertainty, limit)
 
 
 def is_sweep(line: ChartLine) -> bool:
@@ -164,12 +167,12 @@ def path(line: ChartLine, spots: Sequence[Spot]) -> list[list[Spot]]:
     return [sorted(best, key=lambda spot: spot.cost)] if best else []
 
 
-def _worth_showing(uncertainty: float | None, errors: Sequence[float]) -> list[float]:
-    if uncertainty is None or not 0.0 < uncertainty < inf:
+def _worth_showing(level: float | None, errors: Sequence[float]) -> list[float]:
+    if level is None or not 0.0 < level < inf:
         return []
-    if errors and not min(errors) / 10.0**_STRETCH < uncertainty < max(errors) * 10.0**_STRETCH:
+    if errors and not min(errors) / 10.0**_STRETCH < level < max(errors) * 10.0**_STRETCH:
         return []
-    return [uncertainty]
+    return [level]
 
 
 def _limits(values: Sequence[float]) -> tuple[float, float]:

@@ -38,7 +38,7 @@ def plot(chart: Chart) -> Figure:
         shown += [(True, True)] * len(strip)
         layout |= _axes(pair[0], where, bool(strip))
         layout[where.legend] = _legend_at(where)
-        shapes += _uncertainty(pair[0], where)
+        shapes += [*_uncertainty(pair[0], where), *_limit(pair[0], where)]
         if strip:
             annotations.append(_strip_words(where))
     for trace, (first, _) in zip(traces, shown, strict=True):
@@ -175,6 +175,28 @@ def _uncertainty(each: Panel, where: Places) -> list[dict[str, Any]]:
             "line": {"width": 0},
             "layer": "below",
             "name": text,
+            "showlegend": True,
+            "legend": where.legend,
+        }
+    ]
+
+
+def _limit(each: Panel, where: Places) -> list[dict[str, Any]]:
+    """A line at the tolerance, where there is one on these axes."""
+    if each.limit is None or not each.errors[0] < each.limit < each.errors[1]:
+        return []
+    return [
+        {
+            "type": "line",
+            "xref": f"{where.axes['xaxis']} domain",
+            "yref": where.axes["yaxis"],
+            "x0": 0,
+            "x1": 1,
+            "y0": each.limit,
+            "y1": each.limit,
+            "line": {"color": "#222222", "width": 1, "dash": "dash"},
+            "layer": "below",
+            "name": f"tolerance: {each.limit:g} {each.measure.unit}".rstrip(),
             "showlegend": True,
             "legend": where.legend,
         }

@@ -161,7 +161,7 @@ def test_points_without_a_result_stand_outside_with_their_reasons_below() -> Non
 def test_many_reasons_leave_room_for_the_chart_and_say_where_the_others_are() -> None:
     failed = [without_results({_STEP: float(n)}, "failed", f"reason {n}") for n in range(2, 42)]
     figure = draw(_one({"held": [*_sweep({1.0: 0.1}), *failed]}))
-    assert "25 more reasons stand in chart.html and chart.csv." in _words(figure)
+    assert "25 more reasons stand in the table and on the page of this chart." in _words(figure)
     for axis in _panels(figure):
         assert len([each for each in axis.lines if each.get_marker() == "x"]) == 40
 
