@@ -42,7 +42,7 @@ class Entry:
 
 
 def line_entries(chart: Chart, panel: Panel, width_in: float) -> list[Entry]:
-    """The lines of a chart with their orders for this panel's measure, the reference's uncertainty and the tolerance."""
+    """The lines of a chart with their orders for this panel's measure, the reference's uncertainty, the tolerance."""
     room = width_in - _SAMPLE_IN - 0.1
     entries = []
     same = _same_varied(chart)
