@@ -1,6 +1,7 @@
 """Runs what a search asks for, compares it with the reference, and gathers the evidence."""
 
 from collections.abc import Sequence
+from statistics import median
 
 from ..bench import Bench
 from ..chart import Row
@@ -19,6 +20,9 @@ _NEAR, _FINALISTS, _RUNS = 0.08, 4, 7
 #: The line of the best with a longer output interval, and the keys that it changes.
 LONGER = "the best, with twice the output interval"
 _STEP, _EVERY = "coupling.step_ms", "output.every_ms"
+
+#: Wall clock over processor seconds from which on a machine counts as busy with something else; no time is below that.
+_BUSY, _LEAST_S = 1.3, 1e-3
 
 #: The part of a tolerance that the reference may err by itself.
 _TRUSTED = 1.0 / 3.0
@@ -57,13 +61,24 @@ class Tuner:
         rows = [self._rows[place] for place in range(len(self._options))]
         own = self._comparison.row({}, self._bench.known(task.own))
         longer = self._longer(task)
-        notes = _doubts(self._comparison)
+        notes = [*_doubts(self._comparison), *self._disturbance([own, *rows])]
         chart = self._comparison.chart(
             task.scenario.name, str(task.file), _lines(self._options, rows, own, longer), notes
         )
         best, nearest = self._search.best, self._search.nearest()
         wins = longer is not None and best is not None and self._is_better(longer, rows[best])
         return Tuning(task, self._options, rows, own, chart, self._cost, best, nearest, longer if wins else None)
+
+    def _disturbance(self, rows: Sequence[Row]) -> list[str]:
+        """Whether something else was running, so that the wall clock says little."""
+        trials = [row.trial for row in rows if row.trial is not None and row.is_done]
+        waited = median(trial.wall_s / max(trial.cpu_s, _LEAST_S) for trial in trials)
+        if self._cost != WALL or waited <= _BUSY:
+            return []
+        return [
+            f"the machine was busy with something else: runs took {waited:.2g} times their processor seconds, so that "
+            "costs are uncertain by as much; run the same on an idle machine, in another folder"
+        ]
 
     def _longer(self, task: Task) -> Row | None:
         """The best with twice the output interval, where its steps are as long as that."""
