@@ -54,12 +54,22 @@ class Comparison:
         why = dict.fromkeys(difference.why for difference in found.values() if difference.why)
         return Row(settings, trial.status, "; ".join(why), trial, errors)
 
-    def chart(self, name: str, scenario: str, lines: Mapping[str, Sequence[Row]], notes: Sequence[str] = ()) -> Chart:
-        """The chart of `lines`, with fronts and orders; `notes` come before those that follow from the points."""
+    def chart(
+        self,
+        name: str,
+        scenario: str,
+        lines: Mapping[str, Sequence[Row]],
+        notes: Sequence[str] = (),
+        cost: str | None = None,
+    ) -> Chart:
+        """The chart of `lines`, with fronts and orders; `notes` come before those that follow from the points.
+
+        `cost` is WALL or CPU; if it is not given, WALL where all points ran alone.
+        """
         rows = [row for line in lines.values() for row in line]
         compared = [measure for measure in self.measures if any(measure.name in row.errors for row in rows)]
         alone = all(row.trial.alone for row in rows if row.trial is not None and row.is_done)
-        cost = WALL if alone else CPU
+        cost = cost or (WALL if alone else CPU)
         ranked = _ranked(lines, cost, compared)
         return Chart(
             name,

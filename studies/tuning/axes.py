@@ -11,6 +11,9 @@ from ...orchestrator.scenario import Scenario
 #: What the scenario's own internal steps and tolerances are multiplied by, coarse to fine.
 _FACTORS = {"step": (4.0, 2.0, 1.0, 0.5), "tolerance": (100.0, 10.0, 1.0, 0.1)}
 
+#: How many levels that makes, and which is the scenario's own.
+_LEVELS, _OWN = 4, 2
+
 #: Parameters that are varied independently of each other; of more, those of a kind are varied together.
 _MOST_APART = 3
 
@@ -66,11 +69,13 @@ def limited(declared: AccuracyParameter, value: float) -> float:
 
 
 def accuracy_axes(scenario: Scenario, together: bool = False) -> list[Axis]:
-    """An axis for each internal step and tolerance of the units; of many, or `together`, one for all of a kind."""
+    """An axis for each internal step and tolerance of the units; of many one for all of a kind, or one `together`."""
     every = {kind: internals(scenario, kind) for kind in _FACTORS}
-    if together or sum(map(len, every.values())) > _MOST_APART:
-        return [_axis(f"every internal {kind}", found, kind) for kind, found in every.items() if found]
-    return [_axis(each.key, [each], kind) for kind, found in every.items() for each in found]
+    if together:
+        return [_axis("internal accuracy", [each for found in every.values() for each in found])]
+    if sum(map(len, every.values())) > _MOST_APART:
+        return [_axis(f"every internal {kind}", found) for kind, found in every.items() if found]
+    return [_axis(each.key, [each]) for kind, found in every.items() for each in found]
 
 
 def mesh_axes(scenario: Scenario) -> list[Axis]:
@@ -91,14 +96,15 @@ def mesh_axes(scenario: Scenario) -> list[Axis]:
     return axes
 
 
-def _axis(name: str, found: Sequence[Internal], kind: str) -> Axis:
+def _axis(name: str, found: Sequence[Internal]) -> Axis:
     own = {each.key: each.own for each in found}
     levels: list[dict[str, Any]] = []
-    for factor in _FACTORS[kind]:
-        level = own if factor == 1.0 else {each.key: each.times(factor) for each in found}
+    for place in range(_LEVELS):
+        level = {each.key: each.times(_FACTORS[each.declared.kind][place]) for each in found}
+        level = own if place == _OWN else level
         if level not in levels:
             levels.append(level)
-    return Axis(name, levels, levels.index(own), kind == "step")
+    return Axis(name, levels, levels.index(own), {each.declared.kind for each in found} == {"step"})
 
 
 def combined(axes: Sequence[Axis]) -> Iterator[tuple[dict[str, Any], dict[str, float], bool]]:

@@ -94,8 +94,8 @@ class Search:
         if not self._open:
             return []
         phase = min(self.candidates[place].phase for place in self._open)
-        now = [place for place in self._open if self.candidates[place].phase == phase]
-        ready = [place for place in now if not any(coarser in now for coarser in self._coarser[place])]
+        now = {place for place in self._open if self.candidates[place].phase == phase}
+        ready = [place for place in now if now.isdisjoint(self._coarser[place])]
         return sorted(ready, key=lambda place: (self._floor[place], place))[:most]
 
     def tell(self, place: int, outcome: Outcome | None) -> None:

@@ -23,6 +23,7 @@ _STEP, _EVERY = "coupling.step_ms", "output.every_ms"
 
 #: Wall clock over processor seconds from which on a machine counts as busy with something else; no time is below that.
 _BUSY, _LEAST_S = 1.3, 1e-3
+_BUSY_NOTE = "the machine was busy with something else, so that seconds of the processor are compared, not of the clock"
 
 #: The part of a tolerance that the reference may err by itself.
 _TRUSTED = 1.0 / 3.0
@@ -37,19 +38,21 @@ class Tuner:
         self._options = options
         self._search = Search([option.candidate for option in options])
         self._rows: dict[int, Row] = {}
-        known = [bench.known(option.point) for option in options if option.point is not None]
-        alone = bench.is_alone and all(trial.alone for trial in known if trial is not None and trial.is_done)
-        self._cost = WALL if alone else CPU
+        self._cost = WALL if bench.is_alone else CPU
 
     def tuned(self, task: Task) -> Tuning:
         """Search until nothing is left that can win."""
         for place, option in enumerate(self._options):
             if option.point is None:
                 self._tell(place, self._comparison.row(option.shown, None, option.reason))
-        timed: set[int] = set()
+        timed, busy = set[int](), False
         while True:
             while places := self._search.next(self._bench.places):
                 self._run(places)
+            if self._cost == WALL and self._is_busy():
+                busy = True
+                self._count_processor()
+                continue
             finalists = self._search.finalists(_NEAR, _FINALISTS)
             if timed.issuperset(finalists):
                 break
@@ -61,24 +64,25 @@ class Tuner:
         rows = [self._rows[place] for place in range(len(self._options))]
         own = self._comparison.row({}, self._bench.known(task.own))
         longer = self._longer(task)
-        notes = [*_doubts(self._comparison), *self._disturbance([own, *rows])]
-        chart = self._comparison.chart(
-            task.scenario.name, str(task.file), _lines(self._options, rows, own, longer), notes
-        )
+        notes = [*_doubts(self._comparison), *([_BUSY_NOTE] if busy else [])]
+        lines = _lines(self._options, rows, own, longer)
+        chart = self._comparison.chart(task.scenario.name, str(task.file), lines, notes, self._cost)
         best, nearest = self._search.best, self._search.nearest()
         wins = longer is not None and best is not None and self._is_better(longer, rows[best])
         return Tuning(task, self._options, rows, own, chart, self._cost, best, nearest, longer if wins else None)
 
-    def _disturbance(self, rows: Sequence[Row]) -> list[str]:
+    def _is_busy(self) -> bool:
         """Whether something else was running, so that the wall clock says little."""
-        trials = [row.trial for row in rows if row.trial is not None and row.is_done]
-        waited = median(trial.wall_s / max(trial.cpu_s, _LEAST_S) for trial in trials)
-        if self._cost != WALL or waited <= _BUSY:
-            return []
-        return [
-            f"the machine was busy with something else: runs took {waited:.2g} times their processor seconds, so that "
-            "costs are uncertain by as much; run the same on an idle machine, in another folder"
-        ]
+        trials = [row.trial for row in self._rows.values() if row.trial is not None and row.is_done]
+        waited = [trial.wall_s / max(trial.cpu_s, _LEAST_S) for trial in trials]
+        return bool(waited) and median(waited) > _BUSY
+
+    def _count_processor(self) -> None:
+        """Compare seconds of the processor from now on, for the wall clock says little."""
+        self._cost = CPU
+        for place, row in self._rows.items():
+            self._search.tell(place, self._outcome(row))
+        self._search.reconsider()
 
     def _longer(self, task: Task) -> Row | None:
         """The best with twice the output interval, where its steps are as long as that."""
@@ -112,12 +116,17 @@ class Tuner:
 
     def _tell(self, place: int, row: Row) -> None:
         self._rows[place] = row
-        outcome = None
-        if row.is_done and row.trial is not None:
-            # A machine that is busy with something else adds to the wall clock, and little to the processor's.
-            floor = min(min(cost.wall_s, cost.cpu_s) for cost in row.trial.costs)
-            outcome = Outcome(row.cost(self._cost), row.worst(self._comparison.limits), floor)
-        self._search.tell(place, outcome)
+        if self._cost == WALL and row.trial is not None and not row.trial.alone:
+            # It was run before, beside others: only the processor's seconds can be compared with its own.
+            self._count_processor()
+        self._search.tell(place, self._outcome(row))
+
+    def _outcome(self, row: Row) -> Outcome | None:
+        if row.trial is None or not row.is_done:
+            return None
+        # Whatever else a machine does adds to the wall clock, and less to the processor's.
+        floor = min(min(cost.wall_s, cost.cpu_s) if self._cost == WALL else cost.cpu_s for cost in row.trial.costs)
+        return Outcome(row.cost(self._cost), row.worst(self._comparison.limits), floor)
 
     def _point(self, place: int) -> Point:
         point = self._options[place].point
