@@ -8,7 +8,7 @@ from ...orchestrator.results.stored_run import StoredRun
 from ..bench import Bench
 from ..plan import Variants
 from ..point import told
-from .model import Budget, Contribution, Quantity
+from .budget import Budget, Contribution, Quantity
 from .richardson import Estimate, richardson
 from .runs import Runs
 from .source import BASE, COARSER, FINER, FINEST, Settings, Source

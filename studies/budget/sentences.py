@@ -2,7 +2,7 @@
 
 from math import floor, isfinite, log10
 
-from .model import Budget, Contribution, Quantity
+from .budget import Budget, Contribution, Quantity
 
 #: The part of the whole from which on nearly all comes from one source, and below which a part is not worth a word.
 _NEARLY_ALL, _WORTH_SAYING = 0.8, 0.01

@@ -2,7 +2,7 @@
 
 from math import isinf
 
-from .model import WALL, Chart
+from .chart import WALL, Chart
 from .panel import Panel
 
 #: What is said of the entries that a machine has; of others their own name.

@@ -5,8 +5,8 @@ from ...orchestrator.results.comparison import Measure, measures
 from ...orchestrator.results.stored_run import StoredRun
 from ..bench import Bench
 from ..plan import Plan, Reference
+from .chart import Chart
 from .compared import Comparison
-from .model import Chart
 
 
 def chart_study(plan: Plan, bench: Bench) -> Chart:

@@ -10,8 +10,8 @@ from ...orchestrator.results.stored_run import StoredRun
 from ..machine import machine
 from ..order import observed_order, step_of
 from ..trial import REFUSED, Trial
+from .chart import CPU, PRUNED, WALL, Chart, ChartLine, Row
 from .front import on_front
-from .model import CPU, PRUNED, WALL, Chart, ChartLine, Row
 
 
 @dataclass(frozen=True)

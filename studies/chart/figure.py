@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from ...orchestrator.quoting import shortened
 from ...orchestrator.results.whole import write_whole
 from .caption import cost_text, machine_text, note_texts, reference_text
-from .drawing import STRIP_ROW_IN, draw_panel, has_arrows, strip_rows, without_cost
+from .chart import Chart
+from .drawn_panel import STRIP_ROW_IN, draw_panel, has_arrows, strip_rows, without_cost
 from .footnotes import Footnotes, footnotes
 from .key import Entry, draw_column, draw_rows, line_entries, sign_entries
 from .lettering import broken, plain
-from .model import Chart
 from .panel import Panel, panel, views
 
 _DOTS_PER_INCH = 160

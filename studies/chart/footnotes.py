@@ -6,7 +6,7 @@ from math import inf, isfinite, nan
 
 from ...orchestrator.quoting import shortened
 from ..point import told, value_text
-from .model import Chart, Row
+from .chart import Chart, Row
 
 #: Characters of a reason and of the names of its points that are repeated.
 _LONGEST = 300

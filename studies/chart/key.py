@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from .caption import uncertainty_text
-from .drawing import BAND, CROSS, FRONT, INFINITE, LIMIT, ZERO, line_style, marker, without_cost
+from .chart import Chart
+from .drawn_panel import BAND, CROSS, FRONT, INFINITE, LIMIT, ZERO, line_style, marker, without_cost
 from .labels import SIZE as LABEL_SIZE
 from .lettering import broken, name_lines, plain, width_in
-from .model import Chart
 from .panel import Panel, is_sweep
 from .style import Style, style_of
 

@@ -6,8 +6,8 @@ from itertools import groupby
 from math import inf, isfinite, isnan, log10, nan
 
 from ...orchestrator.results.comparison import Measure
+from .chart import CPU, WALL, Chart, ChartLine, Row
 from .front import on_front
-from .model import CPU, WALL, Chart, ChartLine, Row
 
 #: The view over the number of solves, beside the kinds of cost WALL and CPU.
 SOLVES = "solves"

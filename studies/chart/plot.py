@@ -7,9 +7,9 @@ from typing import Any
 from plotly.graph_objects import Figure
 
 from .caption import uncertainty_text
-from .model import Chart
+from .chart import Chart
 from .panel import Panel, panel, views
-from .places import FOOT_PX, HEAD_PX, Places, places_of, suffix
+from .panel_places import FOOT_PX, HEAD_PX, Places, places_of, suffix
 from .telling import safe, safe_lines
 from .traces import panel_traces, strip_traces
 

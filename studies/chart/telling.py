@@ -8,7 +8,7 @@ from textwrap import wrap
 from ...orchestrator.quoting import shortened
 from ...orchestrator.results.comparison import Measure
 from ..point import value_text
-from .model import ChartLine, Row
+from .chart import ChartLine, Row
 
 #: Characters of a text, and of a line of it.
 _LONGEST, _LINE = 500, 90

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from math import isinf, isnan
 from typing import Any
 
-from .model import Chart, ChartLine
+from .chart import Chart, ChartLine
 from .panel import Panel, Spot, is_sweep, path
-from .places import LETTERS, Places
+from .panel_places import LETTERS, Places
 from .style import Style, style_of
 from .telling import hover_text, safe_lines
 

@@ -3,7 +3,7 @@
 from math import isfinite
 
 from ..chart import Row
-from ..chart.model import WALL
+from ..chart.chart import WALL
 from ..point import told
 from .result import Tuning
 

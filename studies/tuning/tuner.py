@@ -5,8 +5,8 @@ from statistics import median
 
 from ..bench import Bench
 from ..chart import Row
+from ..chart.chart import CPU, PRUNED, WALL
 from ..chart.compared import Comparison
-from ..chart.model import CPU, PRUNED, WALL
 from ..point import Point
 from .options import AS_IT_IS, Option
 from .result import Task, Tuning

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from cardiac_cosim.studies.budget import write_budget
-from cardiac_cosim.studies.budget.figure import draw_budget
-from cardiac_cosim.studies.budget.model import Budget, Contribution, Quantity
+from cardiac_cosim.studies.budget.bars import draw_budget
+from cardiac_cosim.studies.budget.budget import Budget, Contribution, Quantity
 from cardiac_cosim.studies.budget.sentences import measured, sentence
 from cardiac_cosim.studies.budget.source import Source
 

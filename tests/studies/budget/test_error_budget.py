@@ -9,7 +9,7 @@ from cardiac_cosim.orchestrator.errors import InputError, RunError
 from cardiac_cosim.orchestrator.scenario import Scenario
 from cardiac_cosim.studies.bench import Bench
 from cardiac_cosim.studies.budget import error_budget, sentences
-from cardiac_cosim.studies.budget.model import Budget, Contribution
+from cardiac_cosim.studies.budget.budget import Budget, Contribution
 from cardiac_cosim.studies.budget.runs import Runs
 from cardiac_cosim.studies.plan import Variants
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from cardiac_cosim.orchestrator.results.comparison import Difference, Measure
+from cardiac_cosim.studies.chart.chart import CPU, WALL, Chart, ChartLine, Row
 from cardiac_cosim.studies.chart.front import on_front
-from cardiac_cosim.studies.chart.model import CPU, WALL, Chart, ChartLine, Row
 from cardiac_cosim.studies.order import observed_order, step_of
 from cardiac_cosim.studies.trial import CRASHED, DONE, FAILED, REFUSED, Cost, Trial
 

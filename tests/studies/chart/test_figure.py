@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from cardiac_cosim.studies.chart.chart import Chart, Row
 from cardiac_cosim.studies.chart.figure import draw, write_figures
 from cardiac_cosim.studies.chart.lettering import broken, plain, width_in
-from cardiac_cosim.studies.chart.model import Chart, Row
 from cardiac_cosim.studies.chart.panel import panel, path, views
 from cardiac_cosim.studies.chart.style import style_of
 from matplotlib.axes import Axes

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cardiac_cosim.studies.chart.chart import Chart, Row
 from cardiac_cosim.studies.chart.figure import draw
-from cardiac_cosim.studies.chart.model import Chart, Row
-from cardiac_cosim.studies.chart.page import page, write_page
+from cardiac_cosim.studies.chart.html_page import page, write_page
 from cardiac_cosim.studies.chart.panel import views
 from cardiac_cosim.studies.chart.plot import plot
 from cardiac_cosim.studies.chart.style import style_of

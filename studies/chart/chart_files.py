@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from .chart import Chart
+from .chart_tables import write_tables
 from .figure import write_figures
-from .model import Chart
-from .page import write_page
-from .table import write_tables
+from .html_page import write_page
 
 
 def write_chart(chart: Chart, folder: Path, stem: str = "chart") -> None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from .model import Chart
+from .chart import Chart
 from .telling import safe_lines
 
 #: Pixels: a panel, at least and at most, what is above and below it, and a line of its legend.

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...orchestrator.results.whole import write_whole
 from ..point import value_text
-from .model import Chart, Row
+from .chart import Chart, Row
 
 
 def write_tables(chart: Chart, folder: Path, stem: str = "chart") -> None:

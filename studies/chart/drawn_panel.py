@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..point import value_text
+from .chart import ChartLine
 from .footnotes import Footnotes
 from .labels import Label, put_labels
-from .model import ChartLine
 from .panel import Panel, Spot, path
 from .style import Style, style_of
 from .ticks import set_ticks

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from .model import Budget, Contribution, Quantity
+from .budget import Budget, Contribution, Quantity
 from .sentences import measured
 
 _PANELS_IN_A_ROW = 3

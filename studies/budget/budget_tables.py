@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 
 from ...orchestrator.results.whole import write_whole
-from .model import Budget
+from .budget import Budget
 from .sentences import sentences
 
 COLUMNS = ("source", "quantity", "value", "estimate", "order", "trusted", "reason", "finer")

@@ -7,7 +7,7 @@ from plotly.io import to_html
 from ...orchestrator.results.whole import write_whole
 from ..point import value_text
 from .caption import cost_text, machine_text, note_texts, reference_text, versions_text
-from .model import Chart, ChartLine, Row
+from .chart import Chart, ChartLine, Row
 from .plot import plot
 from .telling import NOTHING, error_text, processor_text, safe, solves_text, wall_text
 

@@ -8,9 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from ...orchestrator.results.names import BUDGET_CSV, BUDGET_JSON, BUDGET_PNG, BUDGET_SVG
 from ...orchestrator.results.whole import write_whole
-from .figure import draw_budget
-from .model import Budget
-from .table import write_tables
+from .bars import draw_budget
+from .budget import Budget
+from .budget_tables import write_tables
 
 _DOTS_PER_INCH = 160
 
