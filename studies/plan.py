@@ -58,6 +58,8 @@ class Variants:
     """A scenario file with other values at some keys; `origin` stands in front of what is wrong with them."""
 
     def __init__(self, file: Path, common: Mapping[str, Any], origin: str) -> None:
+        if file.suffix.lower() == ".ssp":
+            raise InputError(f"{origin}: {file} is a system package; give the scenario as a YAML file")
         self.file = file
         self._common = dict(common)
         self._origin = origin

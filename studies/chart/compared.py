@@ -126,5 +126,8 @@ def _notes(chosen: Sequence[Measure], compared: Sequence[Measure], rows: Sequenc
         notes.append(f"{missing} of {len(tried)} points have no results")
     never = sum(any(not isfinite(error) for error in row.errors.values()) for row in rows)
     if never:
-        notes.append(f"{never} points lack what the reference has, or have what it lacks: their error is infinite")
+        notes.append(
+            f"infinite error: {never} of {len(tried)} points lack a quantity that the reference has, or have one that "
+            "it lacks"
+        )
     return notes
