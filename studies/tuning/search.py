@@ -1,7 +1,8 @@
 """The search for the cheapest candidate that keeps all tolerances, by as few runs as certainty allows.
 
 Candidates of one group are ordered by how finely they compute: one that is nowhere coarser than another and somewhere
-finer costs no less. From that alone follows most of what need not be run:
+finer costs no less, except that a longer communication step may be the dearer one; so along the coupling the cost has
+to have begun to rise. From that alone follows most of what need not be run:
 
 - a candidate that is finer than one that keeps the tolerances, for it costs more than that one;
 - a candidate that is finer than one that costs more than the best so far, whether that one keeps them or not.
@@ -13,10 +14,17 @@ more than a factor, those that follow it are not run.
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import permutations
 from math import inf
 
 #: Costs nearer than this to each other are taken for equal: seconds of a machine repeat themselves no better.
 NOISE = 0.1
+
+#: How the coordinates of the coupling begin: communication step, tolerance of adaptive steps or of an iteration.
+_COUPLING = ("coupling", "iterate")
+
+#: Coordinates by name, the names in order.
+Coupling = tuple[tuple[str, float], ...]
 
 #: By what factor a lead may miss a tolerance, so that those that follow it are still run.
 _NEARLY = 3.0
@@ -35,6 +43,16 @@ class Candidate:
     coordinates: Mapping[str, float] = field(default_factory=dict)
     phase: int = 0
     leads: tuple[str, ...] = ()
+
+    @property
+    def coupling(self) -> Coupling:
+        """The coordinates of the coupling, in which a finer setting may be the cheaper one."""
+        return tuple(sorted(pair for pair in self.coordinates.items() if pair[0].startswith(_COUPLING)))
+
+    @property
+    def inside(self) -> Coupling:
+        """The other coordinates: how finely the units compute."""
+        return tuple(sorted(pair for pair in self.coordinates.items() if not pair[0].startswith(_COUPLING)))
 
     def is_finer(self, other: "Candidate") -> bool:
         """Whether it is nowhere coarser than `other`, and somewhere finer."""
@@ -81,6 +99,7 @@ class Search:
         # Coarser candidates of each, and how much each costs at least.
         self._coarser = _coarser(candidates)
         self._floor = dict.fromkeys(self._open, 0.0)
+        self._rises: dict[tuple[Hashable, Coupling], list[Coupling]] = {}
 
     @property
     def best(self) -> int | None:
@@ -131,6 +150,7 @@ class Search:
 
     def _prune(self) -> None:
         best = self.best
+        self._rises = self._risen()
         for place in sorted(self._open):
             reason = self._reason(place, best)
             if reason:
@@ -147,6 +167,8 @@ class Search:
             if outcome is None:
                 continue
             self._floor[place] = max(self._floor[place], outcome.floor_s)
+            if not self._costs_no_less(place, coarser):
+                continue
             name = self.candidates[coarser].name
             if outcome.meets:
                 return f"it is finer than a point that meets all tolerances, and so costs more: {name}"
@@ -156,6 +178,38 @@ class Search:
                     f"tolerances costs {self._cost(best):.3g} s ({self.candidates[best].name})"
                 )
         return ""
+
+    def _costs_no_less(self, place: int, coarser: int) -> bool:
+        """Whether a candidate is known to cost at least what one that is `coarser` does.
+
+        It is where both couple alike. Else the cost has to rise already from the one coupling on its way to the other,
+        for any two that differ in that alone: long communication steps may cost more than shorter ones, because the
+        units are far from where they go.
+        """
+        own, other = self.candidates[place], self.candidates[coarser]
+        if own.coupling == other.coupling:
+            return True
+        rises = self._rises.get((other.group, other.coupling), ())
+        return any(_is_between(finer, other.coupling, own.coupling) for finer in rises)
+
+    def _risen(self) -> dict[tuple[Hashable, Coupling], list[Coupling]]:
+        """By group and coupling, the finer couplings at which something was seen to cost more, beyond noise."""
+        alike: dict[Hashable, list[int]] = {}
+        for place, outcome in self.outcomes.items():
+            if outcome is not None:
+                candidate = self.candidates[place]
+                alike.setdefault((candidate.group, candidate.inside), []).append(place)
+        found: dict[tuple[Hashable, Coupling], list[Coupling]] = {}
+        for places in alike.values():
+            for one, other in permutations(places, 2):
+                coarse, fine = self.candidates[one], self.candidates[other]
+                if fine.is_finer(coarse) and self._least(other) > (1.0 + NOISE) * self._least(one):
+                    found.setdefault((coarse.group, coarse.coupling), []).append(fine.coupling)
+        return found
+
+    def _least(self, place: int) -> float:
+        outcome = self.outcomes[place]
+        return inf if outcome is None else outcome.floor_s
 
     def _hopeless(self, lead: int) -> str:
         """Why those that follow a lead cannot be good enough; empty if they may be."""
@@ -174,6 +228,12 @@ class Search:
     def _worst(self, place: int) -> float:
         outcome = self.outcomes[place]
         return inf if outcome is None else outcome.worst
+
+
+def _is_between(coupling: Coupling, coarser: Coupling, finer: Coupling) -> bool:
+    """Whether a coupling is finer than the one, and nowhere finer than the other, which it may be itself."""
+    triples = [(at, low, high) for (_, at), (_, low), (_, high) in zip(coupling, coarser, finer, strict=True)]
+    return all(low <= at <= high for at, low, high in triples) and coupling != coarser
 
 
 def _coarser(candidates: Sequence[Candidate]) -> dict[int, list[int]]:

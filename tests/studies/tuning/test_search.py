@@ -71,6 +71,46 @@ def test_the_winner_is_that_of_an_exhaustive_search_of_a_product(more: list[floa
         assert table[search.best].cost_s == min(meeting)
 
 
+@given(
+    st.lists(
+        st.tuples(st.lists(st.floats(0.0, 3.0), max_size=3), st.lists(st.floats(0.0, 3.0), max_size=3), _ERRORS),
+        min_size=1,
+        max_size=5,
+    ),
+    st.lists(_ERRORS, min_size=35, max_size=35),
+)
+def test_the_winner_is_found_where_long_steps_cost_more_than_shorter_ones(
+    lines: list[tuple[list[float], list[float], float]], errors: list[float]
+) -> None:
+    # Along the communication steps the costs fall first, and then rise.
+    candidates, table = [], []
+    for number, (falling, rising, _) in enumerate(lines):
+        costs = [1.0 + sum(falling[place:]) for place in range(len(falling) + 1)]
+        costs += [1.0 + sum(rising[: place + 1]) for place in range(len(rising))]
+        candidates += [Candidate(f"{number} {at}", number, {"coupling": float(at)}) for at in range(len(costs))]
+        table += [_outcome(cost, errors[7 * number + at]) for at, cost in enumerate(costs)]
+    search = Search(candidates)
+    _run(search, table)
+    meeting = [outcome.cost_s for outcome in table if outcome.meets]
+    assert (search.best is None) == (not meeting)
+    if search.best is not None:
+        assert table[search.best].cost_s == min(meeting)
+
+
+def test_along_the_coupling_the_cost_has_to_rise_before_the_rest_is_left_out() -> None:
+    line = [Candidate(f"jacobi {at}", "jacobi", {"coupling": float(at), "inside": 1.0}) for at in range(5)]
+    table = [_outcome(3.0, 0.9), _outcome(2.0, 0.5), _outcome(1.0, 0.4), _outcome(1.5, 0.3), _outcome(2.5, 0.2)]
+    search = Search(line)
+    assert _run(search, table) == [0, 1, 2, 3]
+    assert search.best == 2
+    # That it rises there holds for all that compute otherwise inside as well.
+    rough = Candidate("rough", "jacobi", {"coupling": 2.0, "inside": 0.0}, 1)
+    finer = Candidate("rough and finer", "jacobi", {"coupling": 3.0, "inside": 0.0}, 1)
+    search = Search([*line, rough, finer])
+    assert _run(search, [*table, _outcome(0.8, 0.7), _outcome(1.2, 0.6)]) == [0, 1, 2, 3, 5]
+    assert search.best == 5
+
+
 def test_what_is_finer_than_a_good_enough_point_is_not_run() -> None:
     search = Search(_line("held", 4))
     asked = _run(search, [_outcome(1.0, 2.0), _outcome(2.0, 0.9), _outcome(3.0, 0.1), _outcome(4.0, 0.0)])
