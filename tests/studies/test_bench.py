@@ -81,7 +81,8 @@ def _errors(out: Path) -> list[list[str]]:
 
 
 def test_stopped_by_a_signal_it_says_how_to_go_on(study: Path, tmp_path: Path) -> None:
-    study.write_text(study.read_text().replace("stop_ms: 40", "stop_ms: 4000"))
+    scenario = tmp_path / "small_cell.yaml"
+    scenario.write_text(scenario.read_text().replace("stop_ms: 40,", "stop_ms: 4000,"))
     process = subprocess.Popen(
         [*_COMMAND, str(study), "--output", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True
     )
