@@ -9,6 +9,7 @@ import hashlib
 import tempfile
 import uuid
 from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -57,14 +58,19 @@ def instantiate(resources, guid):
 
 def sources() -> dict[str, bytes]:
     """The code an FMU carries, by its path in the package."""
+    # Code that differs in as little as this has another hash, and is never taken for the other.
+    return _read(_OWN_FILES if wrapper.library() is not None else (*_OWN_FILES, _PYTHONFMU_FILE))
+
+
+@cache
+def _read(names: tuple[str, ...]) -> dict[str, bytes]:
+    """The units' code and the files `names` of this floor; read once in a process, which runs no other."""
     own = Path(__file__).parent
     floor = Path(registry.__file__).parent
     # Kernels that were compiled when the package was built go along; an FMU without them falls back to NumPy.
     files_there = (path for path in floor.rglob("*") if path.suffix in (".py", ".so"))
     modules = sorted(path.relative_to(floor) for path in files_there)
     files = {f"units/{path.as_posix()}": (floor / path).read_bytes() for path in modules if path.parts[0] != "geometry"}
-    # Code that differs in as little as this has another hash, and is never taken for the other.
-    names = _OWN_FILES if wrapper.library() is not None else (*_OWN_FILES, _PYTHONFMU_FILE)
     files |= {f"fmus/{name}": (own / name).read_bytes() for name in names}
     return files | {"__init__.py": b'"""Units and slave, packaged."""\n'}
 

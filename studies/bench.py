@@ -31,7 +31,7 @@ _SCRATCH = "scratch"
 
 #: Seconds that the repetitions of short runs may take in all, and the part of all other runs by which they may exceed
 #: that: a study of many short points is to be done soon.
-_REPEATS_S, _REPEATS = 15.0, 0.1
+_REPEATS_S, _REPEATS = 10.0, 0.05
 
 #: How often we look whether somebody wants us to stop, in seconds.
 _LOOK_S = 0.2
