@@ -13,8 +13,13 @@ from .errors import InputError
 #: How long Dask may take to close, in seconds.
 _CLOSING_S = 5.0
 
-#: A worker that dies costs what it was doing, which is not tried again; one that works for long has not died.
-_SETTINGS = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-ttl": None}
+#: A worker that dies costs what it was doing, which is not tried again; one that works for long has not died. Nobody
+#: looks at what its threads do every 10 ms: that takes the interpreter away from what is timed.
+_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.worker-ttl": None,
+    "distributed.worker.profile.enabled": False,
+}
 
 
 class Cluster:
