@@ -1,12 +1,16 @@
 """What many tests share: a heart small enough to beat in a second, and a scenario for it."""
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import build_body
 import pytest
+from cardiac_cosim.cli.app import main
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.mesh.file import read_mesh
+from fallbacks import without_fallbacks
 
 DATA = Path(__file__).parent / "data"
 
@@ -66,3 +70,31 @@ def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         quirk.lower(): build_body.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
         for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES", "LEAVES", "BREAKS")
     }
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a call of the command ended; what is slow on this machine is left out of what it says."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def cosim(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
+    """The command, in this process and without figures. A traceback in a terminal is an exception here."""
+
+    def call(*arguments: object) -> Ended:
+        quick = ["--no-figures"] if arguments[0] == "run" else []
+        monkeypatch.setattr(sys, "argv", ["cosim", *map(str, arguments), *quick])
+        capsys.readouterr()
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        out, err = capsys.readouterr()
+        return Ended(code, out, without_fallbacks(err))
+
+    return call

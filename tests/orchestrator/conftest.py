@@ -1,7 +1,6 @@
 """Participants of one line of arithmetic, the command called in this process, and where tests build their FMUs."""
 
 import pickle
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cardiac_cosim.cli.app import main
 from cardiac_cosim.orchestrator.coupling.connections import connect
 from cardiac_cosim.orchestrator.coupling.master import Master
 from cardiac_cosim.orchestrator.coupling.schemes import SCHEMES
@@ -26,7 +24,6 @@ from cardiac_cosim.orchestrator.participants.participant import (
 )
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import Scenario
-from fallbacks import without_fallbacks
 
 #: From the inputs, the outputs, begin and size of a step in s to the outputs at its end.
 Law = Callable[..., Mapping[str, Any]]
@@ -160,34 +157,6 @@ def master() -> Callable[..., Master]:
 @pytest.fixture(scope="session")
 def port() -> Callable[..., Port]:
     return scalar
-
-
-@dataclass(frozen=True)
-class Ended:
-    """How a call of the command ended; what is slow on this machine is left out of what it says."""
-
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def cosim(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
-    """The command, in this process and without figures. A traceback in a terminal is an exception here."""
-
-    def call(*arguments: object) -> Ended:
-        quick = ["--no-figures"] if arguments[0] == "run" else []
-        monkeypatch.setattr(sys, "argv", ["cosim", *map(str, arguments), *quick])
-        capsys.readouterr()
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        out, err = capsys.readouterr()
-        return Ended(code, out, without_fallbacks(err))
-
-    return call
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,5 @@
 """A strand on which a budget takes seconds, and runs that give numbers of a known law instead of physics."""
 
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,7 +7,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from cardiac_cosim.cli.app import main
 from cardiac_cosim.orchestrator.scenario import Scenario
 
 _STRAND = """\
@@ -33,30 +31,6 @@ def strand(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("strand") / "strand.yaml"
     path.write_text(_STRAND)
     return path
-
-
-@dataclass(frozen=True)
-class Ended:
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def cosim(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
-    """The command, in this process."""
-
-    def call(*arguments: object) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["cosim", *map(str, arguments)])
-        capfd.readouterr()
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        return Ended(code, *capfd.readouterr())
-
-    return call
 
 
 #: From a scenario to the activation at its probe, in ms; None where it is not activated.

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pandas
 import pytest
@@ -12,8 +13,6 @@ from cardiac_cosim.orchestrator.simulation import simulate
 from cardiac_cosim.studies.plan import plan_study
 from cardiac_cosim.studies.tuning.options import options_of_study
 from cardiac_cosim.studies.tuning.references import references_of
-
-from .conftest import Ended
 
 _STUDY = """\
 name: steps
@@ -36,7 +35,7 @@ def study(strand: Path) -> Path:
 
 
 def test_a_strand_is_tuned_into_a_scenario_that_keeps_the_tolerance(
-    strand: Path, tmp_path: Path, cosim: Callable[..., Ended]
+    strand: Path, tmp_path: Path, cosim: Callable[..., Any]
 ) -> None:
     out = tmp_path / "out"
     ended = cosim("tune", strand, "--tolerance", "activation_ms=0.05", "--output", out)
@@ -71,7 +70,7 @@ def test_a_strand_is_tuned_into_a_scenario_that_keeps_the_tolerance(
 
 
 def test_a_tolerance_that_nothing_keeps_ends_with_what_comes_nearest(
-    strand: Path, tmp_path: Path, cosim: Callable[..., Ended]
+    strand: Path, tmp_path: Path, cosim: Callable[..., Any]
 ) -> None:
     out = tmp_path / "out"
     out.mkdir()
@@ -89,7 +88,7 @@ def test_a_tolerance_that_nothing_keeps_ends_with_what_comes_nearest(
 
 
 def test_a_study_is_the_whole_choice_and_what_was_run_of_it_is_not_run_again(
-    strand: Path, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cosim: Callable[..., Ended]
+    strand: Path, study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cosim: Callable[..., Any]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert cosim("chart", study).code == 0
@@ -125,7 +124,7 @@ def test_a_study_is_the_whole_choice_and_what_was_run_of_it_is_not_run_again(
     ],
 )
 def test_what_is_wrong_is_told_before_any_reference_is_run(
-    strand: Path, tmp_path: Path, cosim: Callable[..., Ended], arguments: tuple[object, ...], words: list[str]
+    strand: Path, tmp_path: Path, cosim: Callable[..., Any], arguments: tuple[object, ...], words: list[str]
 ) -> None:
     ended = cosim("tune", strand, *arguments, "--output", tmp_path / "out")
     assert ended.code == 2, ended.err
@@ -134,7 +133,7 @@ def test_what_is_wrong_is_told_before_any_reference_is_run(
     assert len(list((tmp_path / "out").glob("points/*"))) <= 1
 
 
-def test_a_study_of_another_scenario_is_refused(strand: Path, study: Path, cosim: Callable[..., Ended]) -> None:
+def test_a_study_of_another_scenario_is_refused(strand: Path, study: Path, cosim: Callable[..., Any]) -> None:
     other = strand.with_name("other.yaml")
     other.write_text(strand.read_text())
     ended = cosim("tune", other, "--study", study, "--tolerance", "activation_ms=1", "--output", strand.parent / "out")
@@ -143,7 +142,7 @@ def test_a_study_of_another_scenario_is_refused(strand: Path, study: Path, cosim
     assert str(study) in ended.err
 
 
-def test_a_package_is_refused(tmp_path: Path, cosim: Callable[..., Ended]) -> None:
+def test_a_package_is_refused(tmp_path: Path, cosim: Callable[..., Any]) -> None:
     ended = cosim("tune", tmp_path / "x.ssp", "--tolerance", "activation_ms=1")
     assert ended.code == 2
     assert "YAML" in ended.err
