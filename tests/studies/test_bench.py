@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,11 @@ def test_stopped_by_a_signal_it_says_how_to_go_on(study: Path, tmp_path: Path) -
     scenario = tmp_path / "small_cell.yaml"
     scenario.write_text(scenario.read_text().replace("stop_ms: 40,", "stop_ms: 4000,"))
     process = subprocess.Popen(
-        [*_COMMAND, str(study), "--output", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True
+        [*_COMMAND, str(study), "--output", str(tmp_path / "out")],
+        stderr=subprocess.PIPE,
+        text=True,
+        # Whoever runs the tests in the background lets them ignore it.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     begin = time.monotonic()
     while not (tmp_path / "out" / "points").is_dir() and time.monotonic() - begin < 60.0:
