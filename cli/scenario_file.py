@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..orchestrator.errors import InputError
-from ..orchestrator.scenario import Scenario, load_scenario, parsed_assignment
+from ..orchestrator.scenario import Scenario, load_scenario, parsed_assignments
 
 if TYPE_CHECKING:
     from ..studies.plan import Variants
@@ -45,7 +45,7 @@ def variants(file: Path, assignments: list[str], scenario: Scenario, base: Path)
     from ..studies.plan import Variants
 
     if file.suffix.lower() != ".ssp":
-        return Variants(file, dict(parsed_assignment(text) for text in assignments), str(file))
+        return Variants(file, parsed_assignments(assignments), str(file))
     content = base / _RESOLVED
     content.write_text(json.dumps(scenario.resolved()), encoding="utf-8")
     return Variants(content, {}, str(file))

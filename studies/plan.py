@@ -12,7 +12,7 @@ from ..orchestrator.scenario import (
     Contradiction,
     Scenario,
     file_content,
-    parsed_assignment,
+    parsed_assignments,
     scenario_content,
     validated,
     with_settings,
@@ -118,7 +118,7 @@ def plan_study(path: Path, assignments: Iterable[str] = ()) -> Plan:
     InputError for a key that the scenario does not have, a value that none can have, and a line without a valid point.
     """
     study = load_study(path)
-    common = study.set | dict(parsed_assignment(assignment) for assignment in assignments)
+    common = study.set | parsed_assignments(assignments)
     variants = Variants(path.parent / study.scenario, common, str(path))
     references = [_reference(variants, path, settings) for settings in study.references]
     lines = {line.name: _planned(variants, line, path) for line in study.lines}

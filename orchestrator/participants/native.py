@@ -128,18 +128,20 @@ def _lower_limit(variable: Variable) -> tuple[float, bool]:
 
 
 def _declared_parameters(unit: str) -> dict[str, Variable]:
+    return {
+        variable.name: variable for variable in _kind(unit).variables() if variable.causality is Causality.PARAMETER
+    }
+
+
+def _kind(unit: str) -> type[Unit]:
     if unit not in UNITS:
         raise InputError(f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}")
-    return {
-        variable.name: variable for variable in UNITS[unit].variables() if variable.causality is Causality.PARAMETER
-    }
+    return UNITS[unit]
 
 
 def is_memoryless(unit: str) -> bool:
     """Whether a unit's outputs follow its inputs at once, as those of an equilibrium do; InputError if it is none."""
-    if unit not in UNITS:
-        raise InputError(f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}")
-    return UNITS[unit].memoryless
+    return _kind(unit).memoryless
 
 
 def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Ports]:

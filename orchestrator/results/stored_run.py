@@ -61,8 +61,6 @@ class StoredRun:
         Times of the stored frames, shape (frames,).
     columns:
         The numbers of the time series by column name, each of shape (rows,); an empty cell is NaN.
-    steps:
-        The numbers of the coupling log in the same way, a row per accepted step.
     summary:
         The content of summary.json.
     """
@@ -107,11 +105,6 @@ class StoredRun:
     def columns(self) -> dict[str, Values]:
         """See the class."""
         return _numbers(self.folder / TIME_SERIES)
-
-    @cached_property
-    def steps(self) -> dict[str, Values]:
-        """See the class."""
-        return _numbers(self.folder / COUPLING)
 
     @cached_property
     def points_mm(self) -> Values | None:

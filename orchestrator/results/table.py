@@ -21,11 +21,11 @@ class Table:
     def __init__(self, path: Path, columns: Sequence[str], resumed: Mapping[str, Any] | None = None) -> None:
         self._file = AppendedFile(path, resumed)
         if resumed is None:
-            self._file.append(_line(columns))
+            self._file.append(csv_line(columns))
 
     def add(self, row: Sequence[float | int | str | None]) -> None:
         """Append a row and hand it to the operating system."""
-        self._file.append(_line([_cell(value) for value in row]))
+        self._file.append(csv_line([_cell(value) for value in row]))
 
     def rows(self) -> list[list[str]]:
         """The cells of all rows."""
@@ -40,7 +40,8 @@ class Table:
         self._file.close()
 
 
-def _line(cells: Sequence[str]) -> bytes:
+def csv_line(cells: Sequence[Any]) -> bytes:
+    """A line of a CSV file; numbers with all their digits."""
     text = io.StringIO(newline="")
     csv.writer(text).writerow(cells)
     return text.getvalue().encode()

@@ -5,12 +5,12 @@ from .file import (
     checked,
     file_content,
     load_scenario,
-    parsed_assignment,
+    parsed_assignments,
     scenario_content,
     validated,
     with_settings,
 )
-from .model import ConnectionEntry, Coupling, Iterate, Scenario, Scene, UnitEntry
+from .model import ConnectionEntry, Coupling, Iterate, Scenario, Scene, UnitEntry, is_whole
 from .rewritten import rewritten
 
 __all__ = [
@@ -23,8 +23,9 @@ __all__ = [
     "UnitEntry",
     "checked",
     "file_content",
+    "is_whole",
     "load_scenario",
-    "parsed_assignment",
+    "parsed_assignments",
     "rewritten",
     "scenario_content",
     "validated",

@@ -1,6 +1,6 @@
 """Scenarios from files and from the command line."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -70,23 +70,32 @@ def with_settings(content: Mapping[str, Any], settings: Mapping[str, Any]) -> di
     changed = dict(content)
     for key, value in settings.items():
         parts = key.split(".")
-        if not all(parts) or len(parts) > _DEEPEST_KEY + 1 or not key.isprintable():
+        if not _is_key(key, parts):
             raise InputError(f"{quoted(key)}: write a key of a scenario as coupling.step_ms")
         _place(changed, parts, value, quoted(key), "")
     return changed
 
 
-def parsed_assignment(assignment: str) -> tuple[str, Any]:
+def parsed_assignments(assignments: Iterable[str]) -> dict[str, Any]:
+    """The values by key of several `key.path=value`; of a key that is named twice the last."""
+    return dict(_parsed(assignment) for assignment in assignments)
+
+
+def _parsed(assignment: str) -> tuple[str, Any]:
     """The key and the value of `key.path=value`; InputError if it is none."""
     key, separator, text = assignment.partition("=")
     parts = [part.strip() for part in key.split(".")]
     told = shortened(assignment, _LONGEST_ORIGIN)
-    if not separator or not all(parts) or len(parts) > _DEEPEST_KEY + 1 or not key.isprintable():
+    if not separator or not _is_key(key, parts):
         raise InputError(f"--set {told}: write it as key.path=value, e.g. --set run.stop_ms=100")
     try:
         return ".".join(parts), parse_yaml(text)
     except ValueError as error:
         raise InputError(f"--set {told}: the value is {error}") from None
+
+
+def _is_key(key: str, parts: Sequence[str]) -> bool:
+    return all(parts) and len(parts) <= _DEEPEST_KEY + 1 and key.isprintable()
 
 
 def validated(content: Mapping[str, Any], model: type[_Model], origin: str) -> _Model:
@@ -120,7 +129,7 @@ def _read(path: Path, kind: str) -> Any:
 
 
 def _assign(content: dict[str, Any], assignment: str) -> None:
-    key, value = parsed_assignment(assignment)
+    key, value = _parsed(assignment)
     _place(content, key.split("."), value, f"--set {shortened(assignment, _LONGEST_ORIGIN)}", "--set ")
 
 

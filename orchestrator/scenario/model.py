@@ -230,6 +230,11 @@ class Iterate(_Section):
     converge: Annotated[dict[str, CriterionEntry], Field(min_length=1)]
     on_limit: Literal["error", "warn"] = "error"
 
+    def limits_times(self, factor: float) -> dict[str, dict[str, float]]:
+        """The limits by field and measure, as `converge` has them, times a factor."""
+        limits = {name: entry.model_dump(by_alias=True, exclude_none=True) for name, entry in self.converge.items()}
+        return {name: {measure: limit * factor for measure, limit in own.items()} for name, own in limits.items()}
+
 
 class Adaptive(_Section):
     """Communication steps by an error estimate; `tolerance` is relative to the fields' magnitudes."""
@@ -349,7 +354,7 @@ class Scenario(_Section):
         if adaptive is not None:
             steps = self.run.stop_ms / self.output.every_ms
             self._check_count("run.stop_ms", self.run.stop_ms, self.run.stop_ms / adaptive.min_ms, "adaptive.min_ms")
-            if not _is_whole(steps):
+            if not is_whole(steps):
                 raise ValueError(
                     f"`run.stop_ms` ({self.run.stop_ms:g} ms) is no whole number of `output.every_ms` "
                     f"({self.output.every_ms:g} ms), which `coupling.adaptive` needs; change one of them"
@@ -358,7 +363,7 @@ class Scenario(_Section):
         step = self.coupling.step_ms
         for key, time in (("run.stop_ms", self.run.stop_ms), ("output.every_ms", self.output.every_ms)):
             self._check_count(key, time, time / step, "step_ms")
-            if not _is_whole(time / step):
+            if not is_whole(time / step):
                 raise ValueError(
                     f"`{key}` ({time:g} ms) is no whole number of steps of `coupling.step_ms` "
                     f"({step:g} ms); change one of them"
@@ -399,5 +404,6 @@ class Scenario(_Section):
         return content
 
 
-def _is_whole(steps: float) -> bool:
+def is_whole(steps: float) -> bool:
+    """Whether a time over a step is a whole number of steps, one at least, but for rounding."""
     return round(steps) >= 1 and abs(steps - round(steps)) <= _WHOLE * steps

@@ -1,13 +1,12 @@
 """errors.csv, a row per source and quantity, and errors.json, the budget in words."""
 
-import csv
-import io
 import json
 from math import isfinite
 from pathlib import Path
 
+from ...orchestrator.results.table import csv_line
 from ...orchestrator.results.whole import write_whole
-from .budget import Budget
+from .budget import Budget, Contribution
 from .sentences import sentences
 
 COLUMNS = ("source", "quantity", "value", "estimate", "order", "trusted", "reason", "finer")
@@ -15,18 +14,8 @@ COLUMNS = ("source", "quantity", "value", "estimate", "order", "trusted", "reaso
 
 def write_tables(budget: Budget, csv_path: Path, json_path: Path) -> None:
     """Write both files."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(COLUMNS)
-    for quantity in budget.quantities:
-        for each in quantity.contributions:
-            estimate = repr(each.estimate) if isfinite(each.estimate) else ""
-            order = "" if each.order is None else f"{each.order:.3g}"
-            trusted = int(each.trusted)
-            writer.writerow(
-                [each.source, each.quantity, repr(each.value), estimate, order, trusted, each.reason, each.finer]
-            )
-    write_whole(csv_path, text.getvalue().encode())
+    rows = [COLUMNS, *(_cells(each) for quantity in budget.quantities for each in quantity.contributions)]
+    write_whole(csv_path, b"".join(map(csv_line, rows)))
     content = {
         "scenario": budget.name,
         "sentences": sentences(budget),
@@ -37,3 +26,9 @@ def write_tables(budget: Budget, csv_path: Path, json_path: Path) -> None:
         "notes": list(budget.notes),
     }
     write_whole(json_path, f"{json.dumps(content, indent=2, ensure_ascii=False)}\n".encode())
+
+
+def _cells(each: Contribution) -> list[str | float]:
+    estimate = each.estimate if isfinite(each.estimate) else ""
+    order = "" if each.order is None else f"{each.order:.3g}"
+    return [each.source, each.quantity, each.value, estimate, order, int(each.trusted), each.reason, each.finer]

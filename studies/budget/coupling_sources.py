@@ -55,16 +55,10 @@ def iteration(scenario: Scenario) -> Source | None:
     iterate = scenario.coupling.iterate
     if iterate is None:
         return None
-    limits = {
-        field: criterion.model_dump(by_alias=True, exclude_none=True) for field, criterion in iterate.converge.items()
-    }
     levels = {
         level: Level(
             {
-                f"{_ITERATE}.converge": {
-                    field: {kind: limit * TOLERANCE_RATIO**-level for kind, limit in given.items()}
-                    for field, given in limits.items()
-                },
+                f"{_ITERATE}.converge": iterate.limits_times(TOLERANCE_RATIO**-level),
                 # A run that had enough iterations is to have enough.
                 f"{_ITERATE}.max_iterations": iterate.max_iterations * 2 ** max(level, 0),
             }

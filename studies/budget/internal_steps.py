@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, isclose
 
-from ...orchestrator.participants.native import accuracy_parameters
 from ...orchestrator.scenario import Scenario
+from ..internals import internals
 
 #: How far a ratio of times may be from a whole number and still be taken for rounding.
 _ROUNDING = 1e-9
@@ -50,15 +50,8 @@ def count(whole_ms: float, longest_ms: float) -> int:
 
 def internal_steps(scenario: Scenario) -> list[InternalStep]:
     """Those of all units that have one."""
+    step_ms, units = scenario.coupling.step_ms, scenario.units
     return [
-        InternalStep(
-            unit,
-            name,
-            float(entry.parameters.get(name, parameter.default)),
-            scenario.coupling.step_ms * entry.every,
-        )
-        for unit, entry in scenario.units.items()
-        if entry.unit is not None
-        for name, parameter in accuracy_parameters(entry.unit).items()
-        if parameter.kind == "step"
+        InternalStep(each.unit, each.declared.name, float(each.own), step_ms * units[each.unit].every)
+        for each in internals(scenario, "step")
     ]

@@ -1,9 +1,8 @@
 """The errors that units make inside, by the parameters that they declare to decide them."""
 
-from collections.abc import Iterator
-
-from ...orchestrator.participants.native import accuracy_parameters, is_memoryless
-from ...orchestrator.scenario import Scenario
+from ...orchestrator.participants.native import is_memoryless
+from ...orchestrator.scenario import Scenario, is_whole
+from ..internals import Internal, internals
 from .internal_steps import InternalStep, internal_steps
 from .source import COARSER, FINER, LEVELS, TOLERANCE_ORDER, TOLERANCE_RATIO, Level, Source
 
@@ -13,8 +12,8 @@ def internal(scenario: Scenario) -> list[Source]:
     steps = internal_steps(scenario)
     return [
         *(_step(step, scenario.coupling.adaptive is not None, _labelled(step, steps)) for step in steps),
-        *(_mesh(unit, key, refine) for unit, key, refine in _parameters(scenario, "mesh")),
-        *(_tolerance(unit, key, limit) for unit, key, limit in _parameters(scenario, "tolerance")),
+        *(_mesh(each) for each in internals(scenario, "mesh")),
+        *(_tolerance(each) for each in internals(scenario, "tolerance")),
     ]
 
 
@@ -22,7 +21,7 @@ def other_meshes(scenario: Scenario) -> Source | None:
     """The mesh on which fields are exchanged and all units solve that have none of their own; None without a scene."""
     if scenario.scene is None:
         return None
-    own = {key: int(refine) for _, key, refine in _parameters(scenario, "mesh")}
+    own = {each.key: int(each.own) for each in internals(scenario, "mesh")}
     refine = scenario.scene.refine
     levels = {0: Level({})}
     if refine > 0:
@@ -58,7 +57,7 @@ def _step(step: InternalStep, adaptive: bool, name: str) -> Source:
     now = step.longest_ms if adaptive else step.taken_ms()
     levels = {level: Level({step.key: now * 2.0**-level} if level else {}) for level in LEVELS}
     doubled = step.whole_ms / (2.0 * now)
-    if not adaptive and (round(doubled) < 1 or abs(doubled - round(doubled)) > 1e-9 * doubled):
+    if not adaptive and not is_whole(doubled):
         # No internal step is longer than the communication step, and they are whole in number.
         del levels[COARSER]
     return Source(
@@ -71,16 +70,17 @@ def _labelled(step: InternalStep, steps: list[InternalStep]) -> str:
     return f"{step.unit} sub-step" if alone else f"{step.unit} {step.name}"
 
 
-def _mesh(unit: str, key: str, refine: float) -> Source:
-    levels = {level: Level({key: int(refine) + level} if level else {}) for level in LEVELS}
-    return Source(f"{unit} mesh", f"`{key}` + 1", "the mesh size", levels, f"raise `{key}`")
+def _mesh(refine: Internal) -> Source:
+    key = refine.key
+    levels = {level: Level({key: int(refine.own) + level} if level else {}) for level in LEVELS}
+    return Source(f"{refine.unit} mesh", f"`{key}` + 1", "the mesh size", levels, f"raise `{key}`")
 
 
-def _tolerance(unit: str, key: str, limit: float) -> Source:
-    levels = {level: Level({key: limit * TOLERANCE_RATIO**-level} if level else {}) for level in LEVELS}
-    name = key.rpartition(".")[2].replace("_", " ")
+def _tolerance(limit: Internal) -> Source:
+    key = limit.key
+    levels = {level: Level({key: limit.own * TOLERANCE_RATIO**-level} if level else {}) for level in LEVELS}
     return Source(
-        f"{unit} {name}",
+        f"{limit.unit} {limit.declared.name.replace('_', ' ')}",
         f"a quarter of `{key}`",
         "the tolerance",
         levels,
@@ -88,13 +88,3 @@ def _tolerance(unit: str, key: str, limit: float) -> Source:
         TOLERANCE_RATIO,
         TOLERANCE_ORDER,
     )
-
-
-def _parameters(scenario: Scenario, kind: str) -> Iterator[tuple[str, str, float]]:
-    """The unit, the key and the value of all parameters of a kind."""
-    for unit, entry in scenario.units.items():
-        if entry.unit is not None:
-            for name, parameter in accuracy_parameters(entry.unit).items():
-                if parameter.kind == kind:
-                    value = entry.parameters.get(name, parameter.default)
-                    yield unit, f"units.{unit}.parameters.{name}", value

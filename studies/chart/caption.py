@@ -40,6 +40,11 @@ def uncertainty_text(panel: Panel) -> str:
     return f"{text}, below these axes" if value <= panel.errors[0] else text
 
 
+def limit_text(panel: Panel) -> str:
+    """The largest error that is allowed, in the unit of the panel's measure; empty where none is given."""
+    return "" if panel.limit is None else f"tolerance: {panel.limit:g} {panel.measure.unit}".rstrip()
+
+
 def cost_text(chart: Chart) -> str:
     """A sentence on what the points' cost is."""
     return _COSTS[chart.cost == WALL]

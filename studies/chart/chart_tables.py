@@ -1,12 +1,11 @@
 """The tables of a chart: a CSV file with a row per point, and a JSON file with what the numbers come from."""
 
-import csv
-import io
 import json
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ...orchestrator.results.table import csv_line
 from ...orchestrator.results.whole import write_whole
 from ..point import value_text
 from .chart import Chart, Row
@@ -14,13 +13,8 @@ from .chart import Chart, Row
 
 def write_tables(chart: Chart, folder: Path, stem: str = "chart") -> None:
     """Write both files to `folder`, called after `stem`."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(_columns(chart))
-    for line in chart.lines:
-        for row in line.rows:
-            writer.writerow([line.name, *_cells(chart, row)])
-    write_whole(folder / f"{stem}.csv", text.getvalue().encode())
+    rows = [_columns(chart), *([line.name, *_cells(chart, row)] for line in chart.lines for row in line.rows)]
+    write_whole(folder / f"{stem}.csv", b"".join(map(csv_line, rows)))
     write_whole(folder / f"{stem}.json", f"{json.dumps(_content(chart), indent=2)}\n".encode())
 
 

@@ -1,16 +1,13 @@
 """A chart as a figure: error against cost, a row for each measure, over seconds and, beside that, over solves."""
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ...orchestrator.quoting import shortened
-from ...orchestrator.results.whole import write_whole
+from ..picture_files import write_pictures
 from .caption import cost_text, machine_text, note_texts, reference_text
 from .chart import Chart
 from .drawn_panel import STRIP_ROW_IN, draw_panel, has_arrows, strip_rows, without_cost
@@ -67,17 +64,9 @@ def draw(chart: Chart) -> Figure:
 
 def write_figures(chart: Chart, folder: Path, stem: str = "chart") -> list[Path]:
     """Write `chart.png` and `chart.svg` into `folder`, or the same called after `stem`; returns the files."""
-    figure = draw(chart)
-    FigureCanvasAgg(figure)
-    written = []
-    # The same chart gives the same file.
-    with rc_context({"svg.hashsalt": "cardiac-cosim"}):
-        for kind, metadata in (("png", {}), ("svg", {"Date": None})):
-            content = io.BytesIO()
-            figure.savefig(content, format=kind, dpi=_DOTS_PER_INCH, metadata=metadata)
-            written.append(folder / f"{stem}.{kind}")
-            write_whole(written[-1], content.getvalue())
-    return written
+    paths = {kind: folder / f"{stem}.{kind}" for kind in ("png", "svg")}
+    write_pictures(draw(chart), paths, {"hashsalt": "cardiac-cosim"})
+    return list(paths.values())
 
 
 # --- inside -----------------------------------------------------------------------------------------------------------

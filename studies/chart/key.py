@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from .caption import uncertainty_text
+from .caption import limit_text, uncertainty_text
 from .chart import Chart
 from .drawn_panel import BAND, CROSS, FRONT, INFINITE, LIMIT, ZERO, line_style, marker, without_cost
 from .labels import SIZE as LABEL_SIZE
@@ -60,8 +60,7 @@ def line_entries(chart: Chart, panel: Panel, width_in: float) -> list[Entry]:
         text = f"uncertainty of the reference: {uncertainty_text(panel)}"
         entries.append(Entry(_band_sample, broken(text, _SIZE, room), []))
     if panel.limit is not None:
-        text = f"tolerance: {panel.limit:g} {panel.measure.unit}".rstrip()
-        entries.append(Entry(_stroke(**LIMIT), broken(text, _SIZE, room), []))
+        entries.append(Entry(_stroke(**LIMIT), broken(limit_text(panel), _SIZE, room), []))
     return entries
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from plotly.graph_objects import Figure
 
-from .caption import uncertainty_text
+from .caption import limit_text, uncertainty_text
 from .chart import Chart
 from .panel import Panel, panel, views
 from .panel_places import FOOT_PX, HEAD_PX, Places, places_of, suffix
@@ -161,43 +161,29 @@ def _uncertainty(each: Panel, where: Places) -> list[dict[str, Any]]:
         return []
     low, high = each.errors
     text = f"uncertainty of the reference:<br>{safe(uncertainty_text(each))}"
-    return [
-        {
-            "type": "rect",
-            "xref": f"{where.axes['xaxis']} domain",
-            "yref": where.axes["yaxis"],
-            "x0": 0,
-            "x1": 1,
-            "y0": low,
-            "y1": min(max(each.uncertainty, low), high),
-            "fillcolor": "#b8b8b8",
-            "opacity": 0.4,
-            "line": {"width": 0},
-            "layer": "below",
-            "name": text,
-            "showlegend": True,
-            "legend": where.legend,
-        }
-    ]
+    look = {"type": "rect", "fillcolor": "#b8b8b8", "opacity": 0.4, "line": {"width": 0}}
+    return [look | _across(where, low, min(max(each.uncertainty, low), high), text)]
 
 
 def _limit(each: Panel, where: Places) -> list[dict[str, Any]]:
     """A line at the tolerance, where there is one on these axes."""
     if each.limit is None or not each.errors[0] < each.limit < each.errors[1]:
         return []
-    return [
-        {
-            "type": "line",
-            "xref": f"{where.axes['xaxis']} domain",
-            "yref": where.axes["yaxis"],
-            "x0": 0,
-            "x1": 1,
-            "y0": each.limit,
-            "y1": each.limit,
-            "line": {"color": "#222222", "width": 1, "dash": "dash"},
-            "layer": "below",
-            "name": f"tolerance: {each.limit:g} {each.measure.unit}".rstrip(),
-            "showlegend": True,
-            "legend": where.legend,
-        }
-    ]
+    look = {"type": "line", "line": {"color": _INK, "width": 1, "dash": "dash"}}
+    return [look | _across(where, each.limit, each.limit, safe(limit_text(each)))]
+
+
+def _across(where: Places, low: float, high: float, name: str) -> dict[str, Any]:
+    """A shape over the whole width of a panel, between two errors, with an entry in the legend."""
+    return {
+        "xref": f"{where.axes['xaxis']} domain",
+        "yref": where.axes["yaxis"],
+        "x0": 0,
+        "x1": 1,
+        "y0": low,
+        "y1": high,
+        "layer": "below",
+        "name": name,
+        "showlegend": True,
+        "legend": where.legend,
+    }

@@ -4,9 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...orchestrator.participants.accuracy import AccuracyParameter
-from ...orchestrator.participants.native import accuracy_parameters
 from ...orchestrator.scenario import Scenario
+from ..internals import Internal, internals
 
 #: What the scenario's own internal steps and tolerances are multiplied by, coarse to fine.
 _FACTORS = {"step": (4.0, 2.0, 1.0, 0.5), "tolerance": (100.0, 10.0, 1.0, 0.1)}
@@ -32,40 +31,6 @@ class Axis:
     levels: Sequence[Mapping[str, Any]]
     own: int
     is_step: bool = False
-
-
-@dataclass(frozen=True)
-class Internal:
-    """A parameter that decides a unit's numerical error: its `key` in the scenario, and the value that it has there."""
-
-    key: str
-    declared: AccuracyParameter
-    own: float
-
-    def times(self, factor: float) -> float:
-        """The own value times `factor`, as far as there is no limit to it."""
-        return limited(self.declared, self.own * factor)
-
-
-def internals(scenario: Scenario, *kinds: str) -> list[Internal]:
-    """The parameters of these kinds (`step`, `tolerance`, `mesh`) of all units, in the order of the scenario."""
-    return [
-        Internal(
-            f"units.{name}.parameters.{declared.name}", declared, entry.parameters.get(declared.name, declared.default)
-        )
-        for name, entry in scenario.units.items()
-        if entry.unit is not None
-        for declared in accuracy_parameters(entry.unit).values()
-        if declared.kind in kinds
-    ]
-
-
-def limited(declared: AccuracyParameter, value: float) -> float:
-    """`value`, or the lower limit of the parameter where that is above it; rounded to what a person would write."""
-    rounded = float(f"{value:.6g}")
-    if declared.limit_is_allowed:
-        return max(rounded, declared.lower_limit)
-    return rounded if rounded > declared.lower_limit else float(declared.default)
 
 
 def accuracy_axes(scenario: Scenario, together: bool = False) -> list[Axis]:

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ...orchestrator.participants.accuracy import AccuracyParameter
 from ...orchestrator.scenario import Scenario
-from .axes import internals, limited
+from ..internals import internals
 from .steps import step_below
 
 #: The communication step of the reference over the scenario's, which counts as no longer than this.
@@ -31,27 +30,20 @@ def references_of(scenario: Scenario, finer_mesh: bool) -> list[dict[str, Any]]:
             "coupling.interpolation": "linear",
             "coupling.extrapolation": 1,
             **_iteration(scenario, _FINE["tolerance"][which]),
-            **{each.key: _refined(each.declared, each.own, which) for each in internals(scenario, *_FINE)},
+            **{each.key: each.times(_FINE[each.declared.kind][which]) for each in internals(scenario, *_FINE)},
             **(_mesh(scenario, which) if finer_mesh else {}),
         }
         for which in (0, 1)
     ]
 
 
-def _refined(declared: AccuracyParameter, own: float, which: int) -> float:
-    return limited(declared, own * _FINE[declared.kind][which])
-
-
 def _iteration(scenario: Scenario, factor: float) -> Mapping[str, Any]:
     """The limits of the scenario's iteration times a factor; nothing where it has none."""
-    iterate = scenario.resolved()["coupling"]["iterate"]
+    iterate = scenario.coupling.iterate
     if iterate is None:
         return {}
-    converge = {
-        name: {measure: limit * factor for measure, limit in limits.items() if limit is not None}
-        for name, limits in iterate["converge"].items()
-    }
-    return {"coupling.iterate": {**iterate, "converge": converge, "on_limit": "warn"}}
+    content = iterate.model_dump(by_alias=True)
+    return {"coupling.iterate": {**content, "converge": iterate.limits_times(factor), "on_limit": "warn"}}
 
 
 def _mesh(scenario: Scenario, which: int) -> Mapping[str, Any]:

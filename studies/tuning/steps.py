@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from math import ceil, floor, log10
 
-from ...orchestrator.scenario import Scenario
+from ...orchestrator.scenario import Scenario, is_whole
 
 #: Steps that a person would choose.
 _MANTISSAS = (1.0, 2.0, 2.5, 5.0)
@@ -17,10 +17,7 @@ _WHOLE = 1e-9
 
 def divides(step_ms: float, *times_ms: float) -> bool:
     """Whether each of the times is a whole number of steps."""
-    return all(
-        round(time / step_ms) >= 1 and abs(time / step_ms - round(time / step_ms)) <= _WHOLE * time / step_ms
-        for time in times_ms
-    )
+    return all(is_whole(time / step_ms) for time in times_ms)
 
 
 def communication_steps(scenario: Scenario) -> list[float]:

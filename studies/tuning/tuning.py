@@ -6,7 +6,7 @@ from typing import Any
 
 from ...orchestrator.errors import InputError, RunError
 from ...orchestrator.results.stored_run import StoredRun
-from ...orchestrator.scenario import parsed_assignment
+from ...orchestrator.scenario import parsed_assignments
 from ..bench import Bench
 from ..chart.charted import reference_runs, references_told
 from ..chart.compared import Comparison
@@ -32,7 +32,7 @@ def tune_scenario(
     RunError
         If the scenario as it is or the reference fails.
     """
-    common = dict(parsed_assignment(assignment) for assignment in assignments)
+    common = parsed_assignments(assignments)
     variants = Variants(file, common, str(file))
     own = variants.point({})
     task = Task(file, common, own.scenario, own, variants)
@@ -56,7 +56,7 @@ def tune_study(
     named = Path(plan.origin).parent / plan.study.scenario
     if named.resolve() != file.resolve():
         raise InputError(f"{plan.origin}: scenario: the study is of {named}, not of {file}; give one of the two")
-    common = {**plan.study.set, **dict(parsed_assignment(assignment) for assignment in assignments)}
+    common = plan.study.set | parsed_assignments(assignments)
     own = Variants(named, common, plan.origin).point({})
     task = Task(file, common, own.scenario, own, None)
     measures = chosen_measures(limits, _own(task, bench).run, across_meshes=False)

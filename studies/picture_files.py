@@ -1,0 +1,23 @@
+"""Pictures in a folder: the same one in several formats, and the same content the same file."""
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ..orchestrator.results.whole import write_whole
+
+_DOTS_PER_INCH = 160
+
+
+def write_pictures(figure: Figure, paths: Mapping[str, Path], svg: Mapping[str, str]) -> None:
+    """Write `figure` to `paths` by format, `png` and `svg`; `svg` are Matplotlib's settings for the latter."""
+    FigureCanvasAgg(figure)
+    with rc_context({f"svg.{name}": value for name, value in svg.items()}):
+        for kind, path in paths.items():
+            content = io.BytesIO()
+            figure.savefig(content, format=kind, dpi=_DOTS_PER_INCH, metadata={"Date": None} if kind == "svg" else None)
+            write_whole(path, content.getvalue())
