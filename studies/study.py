@@ -1,17 +1,23 @@
 """A study: what a person asks for in a YAML file. Which settings of a scenario are tried, and against what."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from ..orchestrator.scenario.model import NAME, FilePath
+from ..orchestrator.scenario.model import NAME, FilePath, Positive
 
 #: Values at keys of a scenario (`coupling.step_ms`).
 Settings = dict[str, Any]
 
 #: More references than two say nothing more about how far they are to be trusted.
 _MOST_REFERENCES = 2
+
+#: Halvings of the distance between two cells of a map: twenty are a millionth of it.
+_MOST_HALVINGS = 20
+
+#: More communication steps in every run of a map are a slip of the pen.
+_MOST_STEPS = 10_000_000
 
 
 class _Section(BaseModel):
@@ -53,14 +59,24 @@ class Study(_Section):
 
     `set` is for every point and for the references; `reference` are one or two (`references`); without `measures` all
     that the scenario has are taken.
+
+    For stability maps: the two keys that a line varies are the axes, x first. `steps` gives every run so many
+    communication steps, whatever their size. Between sound cells and others the distance along y is halved `bisect`
+    times. `theory` names what predicts the boundary; `growth` says how the growth of disturbances is measured; a run
+    that errs by more than the `tolerances`, by measure, is inaccurate.
     """
 
     name: Annotated[str, Field(pattern=NAME)]
     scenario: FilePath
     set: Settings = Field(default_factory=dict)
-    reference: Annotated[Any, AfterValidator(_references)]
+    reference: Annotated[Any, AfterValidator(_references)] = None
     measures: Annotated[list[str] | None, Field(min_length=1)] = None
     lines: Annotated[list[Line], Field(min_length=1)]
+    steps: Annotated[int | None, Field(ge=1, le=_MOST_STEPS)] = None
+    bisect: Annotated[int, Field(ge=0, le=_MOST_HALVINGS)] = 0
+    theory: str | None = None
+    growth: Literal["alternating", "modes"] = "alternating"
+    tolerances: dict[str, Positive] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _named_once(self) -> "Study":
@@ -72,5 +88,5 @@ class Study(_Section):
 
     @property
     def references(self) -> list[Settings]:
-        """The one reference, or the two."""
-        return list(self.reference)
+        """The one reference, or the two; none where the study has none."""
+        return list(self.reference or ())

@@ -1,0 +1,1 @@
+"""What theory says of the stability of coupled units and of their explicit steps. One file a theory."""
