@@ -1,0 +1,63 @@
+"""The maps of scenarios/stability in the documentation: some minutes; or `python -m benchmarks.stability NAME`.
+
+Runs what is missing of each study in results/<name>, copies the figure to docs/images/stability, and writes the tables of the
+page.
+"""
+
+import argparse
+from pathlib import Path
+from shutil import copyfile
+
+from cardiac_cosim.studies.bench import Bench
+from cardiac_cosim.studies.plan import plan_study
+from cardiac_cosim.studies.point import value_text
+from cardiac_cosim.studies.stability import map_study, write_map
+from cardiac_cosim.studies.stability.map import KINDS, Panel, StabilityMap
+from rich.console import Console
+
+from .page import write_between
+
+_ROOT = Path(__file__).parent.parent
+STUDIES = _ROOT / "scenarios" / "stability"
+_PAGE = _ROOT / "docs" / "stability.md"
+_IMAGES = _ROOT / "docs" / "images" / "stability"
+
+
+def stability_map(name: str) -> StabilityMap:
+    """Map a study of that name, and put its figure into the documentation."""
+    plan = plan_study(STUDIES / f"{name}.yaml")
+    folder = _ROOT / "results" / plan.study.name
+    with Bench(folder, Console()) as bench:
+        found = map_study(plan, bench)
+    write_map(found, folder)
+    _IMAGES.mkdir(parents=True, exist_ok=True)
+    copyfile(folder / "stability.png", _IMAGES / f"{name}.png")
+    return found
+
+
+def table(found: StabilityMap) -> str:
+    """What each panel has: cells by class, and how far the boundary is from the predicted one at most."""
+    kinds = [kind for kind in KINDS if any(cell.kind == kind for cell in found.cells)]
+    rows = [f"| | {' | '.join(kinds)} | boundary |", "|---" * (2 + len(kinds)) + "|"]
+    for panel in found.panels:
+        counts = [str(sum(cell.kind == kind for cell in panel.cells)) for kind in kinds]
+        rows.append(f"| {panel.name} | {' | '.join(counts)} | {_boundary(panel)} |")
+    return "\n".join(rows)
+
+
+def _boundary(panel: Panel) -> str:
+    if not panel.crossings:
+        return "none"
+    y = panel.y_key.rpartition(".")[2]
+    places = [f"{value_text(each.x)}: {each.measured:.4g}" for each in panel.crossings]
+    known = [each for each in panel.crossings if each.predicted is not None]
+    apart = max((abs(each.measured / each.predicted - 1.0) for each in known if each.predicted), default=None)
+    told = f"{y} {', '.join(places)} at {panel.x_key.rpartition('.')[2]}"
+    return told if apart is None else f"{told}; theory at most {100.0 * apart:.1f} % away"
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.stability", description=__doc__)
+    parser.add_argument("studies", nargs="*", help="names of files in scenarios/stability; all if none is given")
+    for each in parser.parse_args().studies or sorted(path.stem for path in STUDIES.glob("*.yaml")):
+        write_between(_PAGE, each, table(stability_map(each)))
