@@ -8,7 +8,9 @@ from .markup import safe
 #: The browser is to load nothing, whatever names and reasons in a study say.
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
+#: The bar to scroll by is always there, for a figure is drawn before it is known whether there will be one.
 _STYLE = """
+html { overflow-y: scroll }
 body { font-family: sans-serif; color: #222; margin: 1.5em auto; max-width: 80em; padding: 0 1em; line-height: 1.4 }
 table { border-collapse: collapse; font-size: 0.85em }
 th, td { border: 1px solid #ccc; padding: 0.25em 0.5em; text-align: left; vertical-align: top }

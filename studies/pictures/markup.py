@@ -1,9 +1,9 @@
 """Text of strangers as the letters of HTML, which Plotly reads too."""
 
 from html import escape
-from textwrap import wrap
 
 from ...orchestrator.quoting import shortened
+from .line_breaks import in_lines
 
 #: Characters of a text, and of a line of it.
 _LONGEST, _LINE = 500, 90
@@ -19,4 +19,6 @@ def safe(text: str) -> str:
 
 def safe_lines(text: str, longest: int = _LINE) -> str:
     """The same in lines."""
-    return "<br>".join(escape(line, quote=False) for line in wrap(shortened(text, _LONGEST), longest)) or "&nbsp;"
+    return (
+        "<br>".join(escape(line, quote=False) for line in in_lines(shortened(text, _LONGEST), longest, len)) or "&nbsp;"
+    )

@@ -15,7 +15,7 @@ _MACHINE = {
 
 def machine_text(machine: Mapping[str, Any]) -> str:
     """A sentence on the machine; empty where it is not known."""
-    said = [_MACHINE.get(key, f"{key} {{}}").format(value) for key, value in machine.items()]
+    said = [_MACHINE[key].format(value) if key in _MACHINE else f"{key} {value}" for key, value in machine.items()]
     return f"Machine: {', '.join(said)}." if said else ""
 
 
