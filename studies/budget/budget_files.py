@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...orchestrator.results.names import BUDGET_CSV, BUDGET_JSON, BUDGET_PNG, BUDGET_SVG
-from ..picture_files import write_pictures
+from ..pictures.picture_files import write_pictures
 from .bars import draw_budget
 from .budget import Budget
 from .budget_tables import write_tables

@@ -5,15 +5,6 @@ from math import isinf
 from .chart import WALL, Chart
 from .panel import Panel
 
-#: What is said of the entries that a machine has; of others their own name.
-_MACHINE = {
-    "processor": "{}",
-    "cores": "{} cores",
-    "memory_GB": "{} GB of memory",
-    "system": "{}",
-    "python": "Python {}",
-}
-
 _COSTS = {
     True: "Seconds are of the wall clock; each point ran alone on its core.",
     False: "Seconds are of processor time, because points ran beside others.",
@@ -48,20 +39,3 @@ def limit_text(panel: Panel) -> str:
 def cost_text(chart: Chart) -> str:
     """A sentence on what the points' cost is."""
     return _COSTS[chart.cost == WALL]
-
-
-def machine_text(chart: Chart) -> str:
-    """A sentence on the machine; empty where it is not known."""
-    said = [_MACHINE.get(key, f"{key} {{}}").format(value) for key, value in chart.machine.items()]
-    return f"Machine: {', '.join(said)}." if said else ""
-
-
-def versions_text(chart: Chart) -> str:
-    """A sentence on the versions of the program and of what it stands on; empty where they are not known."""
-    said = ", ".join(f"{name} {version}" for name, version in chart.versions.items())
-    return f"Versions: {said}." if said else ""
-
-
-def note_texts(chart: Chart) -> list[str]:
-    """The notes as sentences."""
-    return [f"{note[:1].upper()}{note[1:]}{'' if note.endswith('.') else '.'}" for note in chart.notes]

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..pictures.ticks import set_ticks
 from ..point import value_text
 from .chart import ChartLine
 from .footnotes import Footnotes
 from .labels import Label, put_labels
 from .panel import Panel, Spot, path
 from .style import Style, style_of
-from .ticks import set_ticks
 
 #: The front and what is shaded up to the uncertainty of the reference.
 FRONT: dict[str, Any] = {"color": "0.83", "linewidth": 4.0, "solid_capstyle": "butt", "solid_joinstyle": "miter"}

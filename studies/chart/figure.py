@@ -3,17 +3,19 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...orchestrator.quoting import shortened
-from ..picture_files import write_pictures
-from .caption import cost_text, machine_text, note_texts, reference_text
+from ..pictures.legend import Entry, draw_column, draw_rows, rows_height_in
+from ..pictures.lettering import broken, plain
+from ..pictures.picture_files import write_pictures
+from ..pictures.provenance import machine_text, note_texts
+from ..pictures.sheet import axes_at, words_at, write_lines
+from .caption import cost_text, reference_text
 from .chart import Chart
 from .drawn_panel import STRIP_ROW_IN, draw_panel, has_arrows, strip_rows, without_cost
 from .footnotes import Footnotes, footnotes
-from .key import Entry, draw_column, draw_rows, line_entries, sign_entries
-from .lettering import broken, plain
+from .key import line_entries, sign_entries
 from .panel import Panel, panel, views
 
 _DOTS_PER_INCH = 160
@@ -44,21 +46,19 @@ def draw(chart: Chart) -> Figure:
     )
     signs = sign_entries(chart, [each for row in rows for each in row.panels], width)
     words = _below(chart, notes, width)
-    head = 0.1 + 0.25 * len(title) + sum(max(entry.height_in for entry in row) for row in signs) + 0.1
+    head = 0.1 + 0.25 * len(title) + rows_height_in(signs) + 0.1
     foot = _LINE_IN * len(words) + 0.15
     height = head + sum(row.height for row in rows) + foot
     figure = Figure(figsize=(_WIDTH, height), dpi=_DOTS_PER_INCH)
-    sheet = _inches(figure, (0.0, 0.0, _WIDTH, height))
-    for number, line in enumerate(title):
-        sheet.text(_MARGIN, height - 0.1 - 0.25 * number, plain(line), fontsize=_TITLE_SIZE, weight="bold", va="top")
-    key = _inches(figure, (_MARGIN, 0.0, width, height))
+    sheet = words_at(figure, (0.0, 0.0, _WIDTH, height))
+    write_lines(sheet, title, _MARGIN, height - 0.1, 0.25, fontsize=_TITLE_SIZE, weight="bold")
+    key = words_at(figure, (_MARGIN, 0.0, width, height))
     draw_rows(key, signs, height - 0.1 - 0.25 * len(title) - 0.04)
     top = height - head
     for row in rows:
         row.draw(figure, top, chart, notes)
         top -= row.height
-    for number, line in enumerate(words):
-        sheet.text(_MARGIN, foot - 0.05 - _LINE_IN * number, plain(line), fontsize=_TEXT_SIZE, va="top", color="0.2")
+    write_lines(sheet, words, _MARGIN, foot - 0.05, _LINE_IN, fontsize=_TEXT_SIZE, color="0.2")
     return figure
 
 
@@ -100,7 +100,7 @@ class _Row:
         bottom = top - self._above - self._panel
         for number, each in enumerate(self.panels):
             left = _LEFT + number * (self._width + _GAP)
-            axis = figure.add_axes(_fractions(figure, (left, bottom, self._width, self._panel)))
+            axis = axes_at(figure, (left, bottom, self._width, self._panel))
             draw_panel(axis, each, chart.lines, notes)
             if number:
                 axis.tick_params(axis="y", which="both", labelleft=False)
@@ -113,7 +113,7 @@ class _Row:
         legend_bottom = bottom - _BELOW - (0.0 if self._is_beside else self._legend)
         for number, entries in enumerate(self._columns):
             place = (left + number * self._column, legend_bottom, self._column, self._legend)
-            draw_column(_inches(figure, place), entries, self._legend)
+            draw_column(words_at(figure, place), entries, self._legend)
 
     def _label(self, each: Panel) -> list[str]:
         unit = f" ({each.measure.unit})" if each.measure.unit else ""
@@ -135,20 +135,7 @@ def _below(chart: Chart, notes: Footnotes, width: float) -> list[str]:
         caption.append(
             "The order is the observed order of accuracy: the power of the varied number by which the error grows."
         )
-    caption += [machine_text(chart), *note_texts(chart)]
+    caption += [machine_text(chart.machine), *note_texts(chart.notes)]
     caption = [shortened(text, _LONGEST) for text in caption if text]
     lines = [line for text in texts for line in broken(text, _TEXT_SIZE, width)]
     return [*lines, *[""] * bool(lines), *broken(" ".join(caption), _TEXT_SIZE, width)]
-
-
-def _inches(figure: Figure, place: tuple[float, float, float, float]) -> Axes:
-    """Axes without a frame whose unit is an inch, at left, bottom, width and height."""
-    axis = figure.add_axes(_fractions(figure, place))
-    axis.set(xlim=(0.0, place[2]), ylim=(0.0, place[3]))
-    axis.set_axis_off()
-    return axis
-
-
-def _fractions(figure: Figure, place: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    width, height = figure.get_size_inches()
-    return place[0] / width, place[1] / height, place[2] / width, place[3] / height

@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from .lettering import POINTS, plain, width_in
+from ..pictures.lettering import POINTS, plain, width_in
 
 SIZE = 8.0
 

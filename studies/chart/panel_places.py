@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ..pictures.markup import safe_lines
 from .chart import Chart
-from .telling import safe_lines
 
 #: Pixels: a panel, at least and at most, what is above and below it, and a line of its legend.
 _PANEL, _TALLEST, _ABOVE, _BELOW, _ENTRY = 330, 600, 44, 62, 21

@@ -6,11 +6,11 @@ from typing import Any
 
 from plotly.graph_objects import Figure
 
+from ..pictures.markup import safe, safe_lines
 from .caption import limit_text, uncertainty_text
 from .chart import Chart
 from .panel import Panel, panel, views
 from .panel_places import FOOT_PX, HEAD_PX, Places, places_of, suffix
-from .telling import safe, safe_lines
 from .traces import panel_traces, strip_traces
 
 #: The part of the width that panels have, and where their legends begin.

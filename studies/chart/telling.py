@@ -1,30 +1,12 @@
 """What the page says of a point, as HTML that Plotly shows too: all that is known of it."""
 
 from collections.abc import Mapping
-from html import escape
 from math import isinf, isnan, nan
-from textwrap import wrap
 
-from ...orchestrator.quoting import shortened
 from ...orchestrator.results.comparison import Measure
+from ..pictures.markup import NOTHING, safe, safe_lines
 from ..point import value_text
 from .chart import ChartLine, Row
-
-#: Characters of a text, and of a line of it.
-_LONGEST, _LINE = 500, 90
-
-#: What stands where nothing is known.
-NOTHING = "–"
-
-
-def safe(text: str) -> str:
-    """`text`, not too long, as its letters: HTML and Plotly both take what looks like tags and entities for such."""
-    return escape(shortened(text, _LONGEST), quote=False)
-
-
-def safe_lines(text: str, longest: int = _LINE) -> str:
-    """The same in lines."""
-    return "<br>".join(escape(line, quote=False) for line in wrap(shortened(text, _LONGEST), longest)) or "&nbsp;"
 
 
 def error_text(row: Row, measure: Measure) -> str:

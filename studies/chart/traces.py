@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from math import isinf, isnan
 from typing import Any
 
+from ..pictures.markup import safe_lines
 from .chart import Chart, ChartLine
 from .panel import Panel, Spot, is_sweep, path
 from .panel_places import LETTERS, Places
 from .style import Style, style_of
-from .telling import hover_text, safe_lines
+from .telling import hover_text
 
 
 def panel_traces(chart: Chart, each: Panel, where: Places) -> list[dict[str, Any]]:

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from cardiac_cosim.studies.chart.chart import Chart, Row
 from cardiac_cosim.studies.chart.figure import draw, write_figures
-from cardiac_cosim.studies.chart.lettering import broken, plain, width_in
 from cardiac_cosim.studies.chart.panel import panel, path, views
 from cardiac_cosim.studies.chart.style import style_of
+from cardiac_cosim.studies.pictures.lettering import broken, plain, width_in
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import same_color

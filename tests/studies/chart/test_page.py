@@ -16,7 +16,7 @@ from cardiac_cosim.studies.chart.html_page import page, write_page
 from cardiac_cosim.studies.chart.panel import views
 from cardiac_cosim.studies.chart.plot import plot
 from cardiac_cosim.studies.chart.style import style_of
-from cardiac_cosim.studies.chart.telling import safe
+from cardiac_cosim.studies.pictures.markup import safe
 from synthetic_charts import CPU, MEASURES, chart_of, done, realistic, without_results
 
 _ACTIVATION = MEASURES[0]

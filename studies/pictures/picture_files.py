@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..orchestrator.results.whole import write_whole
+from ...orchestrator.results.whole import write_whole
 
 _DOTS_PER_INCH = 160
 

@@ -6,6 +6,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 
 from ...orchestrator.quoting import shortened
+from .line_breaks import in_lines
 
 #: Characters of a name that a figure shows.
 _LONGEST = 90
@@ -28,28 +29,9 @@ def width_in(text: str, size: float) -> float:
 
 def broken(text: str, size: float, longest_in: float) -> list[str]:
     """`text` in lines that are not wider than `longest_in` inches; words that are wider are cut."""
-    lines, line = [], ""
-    for word in text.split():
-        while width_in(word, size) > longest_in:
-            count = _fitting(word, size, longest_in)
-            lines += [line] * bool(line) + [word[:count]]
-            line, word = "", word[count:]
-        longer = f"{line} {word}".strip()
-        if width_in(longer, size) > longest_in:
-            lines.append(line)
-            longer = word
-        line = longer
-    return lines + [line] * bool(line)
+    return in_lines(text, longest_in, lambda line: width_in(line, size))
 
 
 def name_lines(text: str, size: float, longest_in: float) -> list[str]:
     """The same for a name that a file gave, which may be of any length; there is at least one line."""
     return broken(shortened(text, _LONGEST), size, longest_in) or [""]
-
-
-def _fitting(word: str, size: float, longest_in: float) -> int:
-    """How many letters of a long word fit, at least one."""
-    count = max(int(len(word) * longest_in / width_in(word, size)), 1)
-    while count > 1 and width_in(word[:count], size) > longest_in:
-        count -= 1
-    return count
