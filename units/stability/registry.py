@@ -1,7 +1,18 @@
 """The theories by name. A new one is a file in this folder and a line here."""
 
+from .active_stress_step import ActiveStressStep
+from .explicit_diffusion import ExplicitDiffusion
+from .feedback import Feedback
+from .reaction_step import ReactionStep
 from .theory import Theory
+from .two_masses import TwoMasses
 
-_ALL: tuple[Theory, ...] = ()
+_ALL: tuple[Theory, ...] = (
+    TwoMasses(),
+    Feedback(),
+    ReactionStep(),
+    ExplicitDiffusion(),
+    ActiveStressStep(),
+)
 
 THEORIES: dict[str, Theory] = {theory.name: theory for theory in _ALL}

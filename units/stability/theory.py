@@ -2,11 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from ..arrays import FloatArray
 from ..errors import InvalidInput
 from ..mesh import Mesh
+from ..variable import parameters_of
+
+Group = TypeVar("Group")
 
 #: Fields of one moment by name: `stretch`, `active_stress` in kPa, `displacement` in mm, `fiber`, `sheet`, `potential`.
 Moment = Mapping[str, FloatArray]
@@ -18,6 +21,11 @@ class Setting:
 
     kind: str
     parameters: Mapping[str, Any]
+
+    def group(self, kind: type[Group]) -> Group:
+        """The values of one group of parameters, as that frozen dataclass; defaults where an FMU has none of them."""
+        names = [variable.name for variable in parameters_of(kind)]
+        return kind(**{name: self.parameters[name] for name in names if name in self.parameters})
 
 
 @dataclass(frozen=True)
