@@ -44,7 +44,7 @@ class Feedback:
 
 def _unit(setting: Setting, source: str, coupled: Coupled) -> LinearUnit:
     # Where the loop rests does not matter.
-    law = replace(setting.group(Law), offset=0.0)
+    law = replace(setting.group(Law), offset=0.0, disturbance=0.0)
     step_ms = coupled.step_ms
 
     def step(state: FloatArray, seen: Seen) -> tuple[FloatArray, FloatArray]:

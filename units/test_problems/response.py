@@ -8,7 +8,7 @@ stabilises short steps; and with a dependence on the rate, which long steps stab
 mechanics in numbers (Regazzoni & Quarteroni 2021). The step is exact for an input that is held over it, or runs along
 a line.
 
-Where an offset or `start` makes the loop begin elsewhere than at its rest, there is something to grow.
+With a `disturbance` the output is off at the start, so that there is something to grow or to decay.
 
 How it fails: it does not. What grows without bound is the coupling's affair, until it is no number any more.
 """
@@ -35,7 +35,7 @@ class Law:
         0.0, "1/ms", "epsilon, rate at which the output follows; 0: without delay", at_least=0.0
     )
     rate_gain_ms: float = parameter(0.0, "ms", "rho, output per rate of the input, which is taken over a step")
-    start: float = parameter(0.0, "1", "output at the start, where there is a delay")
+    disturbance: float = parameter(0.0, "1", "by how much the output is off at the start")
 
     def target(self, u: FloatArray) -> FloatArray:
         """g u + b."""
@@ -64,8 +64,8 @@ class Response(Unit):
         self._law = self.parameters(Law)
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
-        """Without a delay the answer to the input, which is at rest; with one, `start`."""
-        delayed = np.asarray(self._law.start) if self._law.delay_rate_per_ms else self._law.target(inputs["u"])
+        """The answer to an input that has been what it is for long, and the disturbance."""
+        delayed = np.asarray(self._law.target(inputs["u"]) + self._law.disturbance)
         return {"delayed": delayed, "rate_per_ms": np.asarray(0.0), "last": inputs["u"].copy()}
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
