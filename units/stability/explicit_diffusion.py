@@ -10,9 +10,9 @@ G is that of the largest stretch of each element in a sound run, where there is 
 mode of diffusion limits the substep, and what is left is the limit of the cells (`reaction_step`).
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -54,11 +54,11 @@ class ExplicitDiffusion:
         setting, mesh = coupled.only("electrophysiology"), coupled.mesh()
         conduction, time_scale = setting.group(Conduction), setting.group(TimeScale)
         levels = setting.group(Resolution).refine
-        fiber, stretch = _fiber(coupled, mesh), _stretch(coupled)
-        bits = (fiber.tobytes(), None if stretch is None else stretch.tobytes())
-        key = (mesh.fingerprint, conduction, time_scale, levels, hash(bits))
+        directions, stretch = _directions(coupled), _stretch(coupled)
+        key = (mesh.fingerprint, conduction, time_scale, levels, _bits(directions), _bits(stretch))
         if key not in self._known:
             inner = refined(mesh, levels)
+            fiber = directions if isinstance(directions, np.ndarray) else _generated(mesh, directions)
             equation = Monodomain(inner.mesh, fiber[inner.parents], time_scale, conduction)
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
@@ -66,16 +66,28 @@ class ExplicitDiffusion:
         return self._known[key]
 
 
-def _fiber(coupled: Coupled, mesh: Mesh) -> FloatArray:
+def _directions(coupled: Coupled) -> FloatArray | Mapping[str, Any]:
+    """The fibres of a sound run, or the parameters by which they are generated."""
     for moment in coupled.moments():
         if "fiber" in moment:
             return moment["fiber"]
+    return coupled.only("fiber_generator").parameters
+
+
+def _generated(mesh: Mesh, parameters: Mapping[str, Any]) -> FloatArray:
     generator = FiberGenerator(mesh)
-    generator.instantiate(coupled.only("fiber_generator").parameters)
+    generator.instantiate(parameters)
     generator.setup_experiment()
     generator.enter_initialization_mode()
     generator.exit_initialization_mode()
     return np.asarray(generator.get("fiber"))
+
+
+def _bits(given: FloatArray | Mapping[str, Any] | None) -> Hashable:
+    """What tells one from another."""
+    if isinstance(given, np.ndarray):
+        return hash(given.tobytes())
+    return None if given is None else tuple(sorted(given.items()))
 
 
 def _stretch(coupled: Coupled) -> FloatArray | None:

@@ -15,6 +15,7 @@ an action potential that lasts as long as it should within 3 %. At 0.3 β_t the 
 what a cell reaches and the step fails. (Forward Euler has the same limit, and oscillates beyond it.)
 """
 
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -72,6 +73,7 @@ def _stimulated(setting: Setting) -> float:
     return (setting.group(Stimulus).stimulus_potential_mV - scale.rest_potential_mV) / scale.potential_range_mV
 
 
+@lru_cache(maxsize=256)
 def _decay(ionic: IonicModel, start: float) -> float:
     """The fastest decay along a pulse from φ = `start`, in the model's time."""
 

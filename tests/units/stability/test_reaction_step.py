@@ -76,7 +76,7 @@ def test_with_recovery_the_limit_is_nearly_the_same_and_follows_the_smallest_tim
     decay = fastest_decay(cell(0.25))
     assert decay == pytest.approx(8.0 * 0.99 / 12.9, rel=2e-3)
     assert fastest_decay(cell(0.25, time_scale_ms=5.8)) == pytest.approx(decay * 12.9 / 5.8, rel=1e-6)
-    # In the heart it falls from 14.3 ms at the base to 8.0 ms at the apex.
+    # In the heart it falls from 14.3 ms at the base to 8.6 ms at the apex.
     strand = build("strand", 10.0)
     deep = Mesh(strand.points - [0.0, 0.0, 70.0], strand.cells)
     reduced = cell(0.25, deep, time_scale_reduction=0.55)
