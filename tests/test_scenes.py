@@ -20,6 +20,8 @@ _SHORT = {
     "arrival_times": ("run.stop_ms=20",),
     "left_ventricle": ("run.stop_ms=20", "scene.mesh_size_mm=12"),
 }
+#: What the columns are called that a scene is there for, where it is not the potential.
+_WATCHED = {"inflation": "lv_pressure_", "oscillator": "first", "feedback": "forth"}
 _TIME_SCALE_MS = 12.9
 
 
@@ -37,7 +39,7 @@ def test_every_scene_runs_and_says_what_one_learns(name: str, tmp_path: Path) ->
     series, summary = _run(name, tmp_path, *_SHORT.get(name, ()))
     assert summary["status"] == "done"
     assert len(series) == summary["steps"] + 1
-    watched = "lv_pressure_" if name == "inflation" else "potential_"
+    watched = _WATCHED.get(name, "potential_")
     columns = [column for column in series.dtype.names or () if column.startswith(watched)]
     assert columns
     for column in columns:
@@ -46,7 +48,7 @@ def test_every_scene_runs_and_says_what_one_learns(name: str, tmp_path: Path) ->
         assert file["frames_ms"][-1] == summary["end_ms"]
 
 
-@pytest.mark.parametrize("name", ["cell", "strand", "sheet", "inflation"])
+@pytest.mark.parametrize("name", ["cell", "strand", "sheet", "inflation", "oscillator", "feedback"])
 def test_small_scenes_run_through_fmus_with_the_same_bits(name: str, tmp_path: Path) -> None:
     stop = ("run.stop_ms=20",)
     _run(name, tmp_path / "native", *stop)
@@ -118,6 +120,31 @@ def test_the_pressure_volume_curve_of_the_resting_ventricle(tmp_path: Path) -> N
     # Linear elements of the same size resist more: locking makes a heart that cannot be filled.
     linear, _ = _run("inflation", tmp_path / "linear", "units.mechanics.parameters.element_order=1")
     assert np.interp(1.0, pressure, linear["lv_volume_ml"]) < np.interp(1.0, pressure, volume) - 1.0
+
+
+def test_the_oscillators_error_falls_with_the_step_until_it_is_unstable(tmp_path: Path) -> None:
+    # Limits as the scene's text has them: 0.078 s with held inputs, 0.318 s with linear ones, none by displacements.
+    linear = ("coupling.interpolation=linear", "coupling.extrapolation=1")
+    places = "first.x -> second.x_in, first.v -> second.v_in, second.x -> first.x_in, second.v -> first.v_in"
+    displacements = (f"connections=[{places}]", "units.first.parameters={k: 10, c: 0.2, k_c: 10, c_c: 0.5, x_start: 1}")
+    for sets, step_ms, stable in (
+        ((), 75, True), ((), 81, False), (linear, 310, True), (linear, 326, False), (displacements, 1000, True)
+    ):  # fmt: skip
+        every = (f"coupling.step_ms={step_ms}", f"run.stop_ms={300 * step_ms}", f"output.every_ms={300 * step_ms}")
+        series, _ = _run("oscillator", tmp_path / f"{len(sets)}-{step_ms}", *sets, *every)
+        assert (np.abs(series["firstx"][-20:]).max() < np.abs(series["firstx"][100:120]).max()) == stable
+
+
+@pytest.mark.parametrize("step_ms", [0.1, 1.0, 8.0])
+def test_a_loops_gain_decides_and_not_the_step_until_it_is_iterated(step_ms: float, tmp_path: Path) -> None:
+    short = (f"coupling.step_ms={step_ms}", f"run.stop_ms={40 * step_ms}", f"output.every_ms={40 * step_ms}")
+    for gain in (-0.9, -1.1):
+        chosen = (*short, f"units.back.parameters.gain={gain}")
+        series, _ = _run("feedback", tmp_path / str(gain), *chosen)
+        assert series["forthy"][-1] == pytest.approx(gain**40, rel=1e-9)
+        iterated = "coupling.iterate={acceleration: anderson, converge: {forth.y: {absolute: 1e-9}}}"
+        series, _ = _run("feedback", tmp_path / f"{gain}-iterated", *chosen, iterated)
+        assert abs(series["forthy"][-1]) < 1e-8
 
 
 # --- scenes that are one another's limits -------------------------------------------------------------------------

@@ -5,8 +5,19 @@ from .eikonal import Eikonal
 from .electrophysiology import Electrophysiology
 from .fiber_generator import FiberGenerator
 from .mechanics import LocalMechanics, Mechanics
+from .test_problems import Mass, Response
 from .unit import Unit
 
 UNITS: dict[str, type[Unit]] = {
-    unit.name: unit for unit in (FiberGenerator, Electrophysiology, Eikonal, ActiveStress, Mechanics, LocalMechanics)
+    unit.name: unit
+    for unit in (
+        FiberGenerator,
+        Electrophysiology,
+        Eikonal,
+        ActiveStress,
+        Mechanics,
+        LocalMechanics,
+        Mass,
+        Response,
+    )
 }

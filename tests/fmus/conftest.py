@@ -33,6 +33,8 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "eikonal": {"activation_time_map": "seed", "diffusion_anisotropic_mm2_per_ms": 0.3},
     "local_mechanics": {"hold": "isometric", "shear_modulus_MPa": 0.3},
     "mechanics": {"newton_iterations": 30, "shear_modulus_MPa": 0.3},
+    "mass": {"k": 5.0, "k_c": 20.0, "c_c": 0.5, "x_start": 1.0, "input_interpolation": "linear"},
+    "response": {"gain": -0.7, "delay_rate_per_ms": 0.4, "rate_gain_ms": 0.3, "disturbance": 0.2},
 }
 
 Fields = dict[str, np.ndarray]
@@ -112,12 +114,15 @@ def _cases(mesh: Mesh) -> dict[str, Case]:
     random = np.random.default_rng(7)
     ranges = {"potential": (-80.0, 20.0), "stretch": (0.95, 1.05), "active_stress": (0.0, 5.0)}
     ranges |= {"lv_pressure": (0.0, 2.0), "rv_pressure": (0.0, 0.5)}
+    ranges |= dict.fromkeys(("F_in", "x_in", "v_in", "u"), (-1.0, 1.0))
     cases = {}
     for name, kind in UNITS.items():
         taken = kind.inputs()
         fixed = {variable.name: fibers[variable.name] for variable in taken if variable.fixed}
         varying = [variable for variable in taken if not variable.fixed]
-        inputs = [{v.name: random.uniform(*ranges[v.name], v.shape(mesh)) for v in varying} for _ in range(4)]
+        inputs = [
+            {v.name: np.asarray(random.uniform(*ranges[v.name], v.shape(mesh))) for v in varying} for _ in range(4)
+        ]
         case = Case(name, mesh, PARAMETERS[name], fixed, inputs)
         case.expected.extend(_native(case))
         cases[name] = case

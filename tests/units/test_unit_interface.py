@@ -17,6 +17,7 @@ from cardiac_cosim.units.mechanics.laws.registry import MATERIALS
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.registry import UNITS
 from cardiac_cosim.units.snapshot import Snapshot
+from cardiac_cosim.units.test_problems import Mass, Response
 from cardiac_cosim.units.unit import Unit
 from cardiac_cosim.units.variable import Causality, Location, Variable, parameters_of
 
@@ -72,14 +73,39 @@ _SCENES = [
         moving={"active_stress": lambda mesh, number: 200.0 * _wave(mesh, number, nodes=True) - 40.0},
         failing={"active_stress": lambda mesh: np.full(mesh.nodes, -5000.0)},
     ),
+    _Scene(
+        Mass,
+        ("x_start", 0.7),
+        moving={
+            "F_in": lambda mesh, number: np.asarray(0.3 + np.sin(number)),
+            "x_in": lambda mesh, number: np.asarray(0.2 + np.cos(number)),
+            "v_in": lambda mesh, number: np.asarray(0.1 - np.sin(number)),
+        },
+        failing={"F_in": lambda mesh: np.asarray(1.7e308), "x_in": lambda mesh: np.asarray(1.7e308)},
+        parameters={"k": 3.0, "k_c": 2.0, "c_c": 1.0},
+    ),
+    _Scene(
+        Response,
+        ("disturbance", 0.7),
+        moving={"u": lambda mesh, number: np.asarray(0.3 + np.sin(number))},
+        failing={"u": lambda mesh: np.asarray(1.7e308)},
+        parameters={"gain": 20.0, "delay_rate_per_ms": 0.4, "rate_gain_ms": 1.0},
+    ),
 ]
 
 each_unit = pytest.mark.parametrize("scene", _SCENES, ids=lambda scene: scene.kind.name)
 each_unit_with_inputs = pytest.mark.parametrize(
     "scene", [scene for scene in _SCENES if scene.moving], ids=lambda scene: scene.kind.name
 )
+each_unit_with_fields = pytest.mark.parametrize(
+    "scene",
+    [scene for scene in _SCENES if scene.moving and scene.kind not in (Mass, Response)],
+    ids=lambda scene: scene.kind.name,
+)
 each_unit_with_memory = pytest.mark.parametrize(
-    "scene", [scene for scene in _SCENES if scene.kind in (Electrophysiology, ActiveStress)], ids=lambda s: s.kind.name
+    "scene",
+    [scene for scene in _SCENES if scene.kind in (Electrophysiology, ActiveStress, Mass, Response)],
+    ids=lambda s: s.kind.name,
 )
 
 
@@ -379,7 +405,7 @@ def test_limits_themselves_are_on_the_right_side(mesh) -> None:
     assert isinstance(other.get("newton_iterations"), int)
 
 
-@each_unit_with_inputs
+@each_unit_with_fields
 def test_wrong_fields_are_refused(scene: _Scene, mesh, alive) -> None:
     unit = alive(scene)
     for name, value in scene.moving.items():
@@ -423,7 +449,7 @@ def test_outputs_cannot_be_set(scene: _Scene, alive) -> None:
                 unit.set(variable.name, np.zeros(variable.shape(unit.mesh)))
 
 
-@each_unit_with_inputs
+@each_unit_with_fields
 def test_inputs_are_copied(scene: _Scene, mesh, alive) -> None:
     unit = alive(scene)
     name, value = next(iter(scene.moving.items()))
@@ -673,9 +699,14 @@ _CHOSEN = {
 _CHOSEN["electrophysiology", "gate_opening_time_ms"] |= {"outward_time_ms": 0.6, "gate_closing_time_ms": 2.0}
 
 
-#: Parameters that do not act here: of what stands behind what does not fail, which test_solvers.py shows to act, and of
-#: shear along the fibre where an element is stretched along its axes only.
-_ELSEWHERE = {("mechanics", "newton_iterations"), ("local_mechanics", "guccione_shear")}
+#: Parameters that do not act here: of what stands behind what does not fail, which test_solvers.py shows to act, of
+#: shear along the fibre where an element is stretched along its axes only, and of what is refused, which
+#: test_explicit_diffusion_step.py shows.
+_ELSEWHERE = {
+    ("mechanics", "newton_iterations"),
+    ("local_mechanics", "guccione_shear"),
+    ("electrophysiology", "explicit_limit"),
+}
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,8 @@ It is the oracle of the compiled substeps (units/kernels/monodomain.h), and what
 or the ionic model has no compiled twin.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csr_matrix
 
@@ -12,6 +14,12 @@ from ..conjugate_gradients import conjugate_gradients
 from .ionic.model import IonicModel, Rates
 from .monodomain import Monodomain
 from .progress import LARGEST_PHI, NOT_ACTIVATED, SOLVER_ITERATIONS, SOLVER_TOLERANCE, Limits, Progress, unsolved
+
+#: One substep: from the values, and what they are foretold to grow by, to the values and what they grew by indeed.
+Step = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+
+#: The substep of an equation while the elements' stretches are held, of a length in ms, with the rates of the cells.
+Stepper = Callable[[Monodomain, FloatArray, float, Rates], Step]
 
 #: The implicit-explicit method (2,2,2) of Ascher, Ruuth & Spiteri 1997, section 2.6: second order, L-stable.
 _GAMMA = 1.0 - 1.0 / np.sqrt(2.0)
@@ -74,9 +82,10 @@ def stepper(equation: Monodomain, stretch: FloatArray, step: float, rates: Rates
 
 
 class Integration:
-    """The substeps of `equation` with the cells of `ionic`."""
+    """The substeps of `equation` with the cells of `ionic`, each made by `make`."""
 
-    def __init__(self, equation: Monodomain, ionic: IonicModel, limits: Limits) -> None:
+    def __init__(self, equation: Monodomain, ionic: IonicModel, limits: Limits, make: Stepper = stepper) -> None:
+        self._make = make
         self._equation = equation
         self._rates = ionic.rates
         self._limits = limits
@@ -91,13 +100,13 @@ class Integration:
         """
         values, activation_time, increments = progress.values, progress.activation_time, progress.increments
         held = np.array_equal(first, last)
-        step = stepper(self._equation, last, substep, self._rates) if held else None
+        step = self._make(self._equation, last, substep, self._rates) if held else None
         ratio = substep / progress.substep_ms if progress.substep_ms else 0.0
         for number in range(count):
             before = values[0]
             if not held:
                 middle = first + (number + 0.5) / count * (last - first)
-                step = stepper(self._equation, middle, substep, self._rates)
+                step = self._make(self._equation, middle, substep, self._rates)
             assert step is not None
             values, grown = step(values, ratio * (2.0 * increments[::2] - increments[1::2]))
             self._check(values[0])

@@ -13,10 +13,13 @@ With `refine` the unit solves on a nested refinement of the scene's mesh: fibre 
 that a part lies in, potential and activation time are given at the scene's nodes.
 
 Linear elements; an implicit-explicit Runge–Kutta method of second order over substeps of equal length (`integration`),
-compiled where it can be (`compiled`).
+compiled where it can be (`compiled`). With `diffusion_step: explicit` diffusion is explicit as well (`explicit_step`),
+and limits the substep.
 
 How it fails: an element coarser than the wave front (≈ 8 mm) gives wrong speeds; a potential that is not finite any
-more, or a linear system that is not solved, ends the step with StepFailure.
+more, or a linear system that is not solved, ends the step with StepFailure. With `explicit_limit: ignored` substeps may
+be longer than what is explicit can follow: excited cells then rest at a potential that is none of theirs, with finite
+numbers for as long as it goes well (`stability.reaction_step`).
 """
 
 from collections.abc import Iterator
@@ -35,6 +38,8 @@ from ..snapshot import State
 from ..unit import Unit
 from ..variable import VOLTAGE, Causality, Location, Record, Refinement, Variable, parameter, parameters_of
 from .compiled import CompiledIntegration, compiled
+from .explicit_step import ExplicitSteps
+from .fastest_mode import fastest_rate
 from .integration import Integration
 from .ionic.model import IonicModel
 from .ionic.registry import IONIC_MODELS, IonicChoice
@@ -75,6 +80,28 @@ class Resolution:
         at_least=0,
         refines=Refinement.MESH,
     )
+    diffusion_step: str = parameter(
+        "implicit",
+        "1",
+        "implicit: diffusion and stretch current never limit the substep; explicit: Heun's method, which they limit",
+        choices=("implicit", "explicit"),
+    )
+    explicit_limit: str = parameter(
+        "enforced",
+        "1",
+        "enforced: a longest_substep_ms that what is explicit cannot follow is refused; ignored: it runs, and fails",
+        choices=("enforced", "ignored"),
+    )
+
+    def substeps(self, step_ms: float) -> int:
+        """Into how many equal substeps a communication step is divided; StepFailure for more than anybody waits for."""
+        count = step_ms / self.longest_substep_ms
+        if count > _MOST_SUBSTEPS:
+            raise StepFailure(
+                f"a step of {step_ms:g} ms would take {count:.3g} substeps of longest_substep_ms = "
+                f"{self.longest_substep_ms:g}; take shorter communication steps, or longer substeps"
+            )
+        return max(1, ceil(count - 1e-9))
 
 
 class Electrophysiology(Unit):
@@ -152,11 +179,7 @@ class Electrophysiology(Unit):
         time_scale = self.parameters(TimeScale)
         clock = time_scale if self._ionic.dimensionless_time else time_scale.relative
         longest = self._ionic.longest_step * float(clock(self.mesh.points[:, 2]).min())
-        if self._resolution.longest_substep_ms > longest:
-            raise InvalidInput(
-                f"parameter 'longest_substep_ms' is {self._resolution.longest_substep_ms:g}; above {longest:.3g} ms "
-                "the explicit step of the ionic model does not resolve the upstroke"
-            )
+        self._check_substep(longest, "the explicit step of the ionic model does not resolve the upstroke")
         self._probes = self.parameters(Probes).places(self.mesh)
         check_levels(self.mesh, self._resolution.refine, "parameter 'refine'")
         self._inner = refined(self.mesh, self._resolution.refine)
@@ -168,7 +191,7 @@ class Electrophysiology(Unit):
             self._lowest_potential,
             self._ionic.lowest_phi_reason,
         )
-        self._integration = compiled(equation, self._ionic, limits) or Integration(equation, self._ionic, limits)
+        self._integration = self._integrated(equation, limits, longest)
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """Rest, except for the stimulated nodes."""
@@ -196,13 +219,7 @@ class Electrophysiology(Unit):
         """Equal substeps, in each of which the stretch is held."""
         if step == 0.0:
             return dict(state)
-        count = step / self._resolution.longest_substep_ms
-        if count > _MOST_SUBSTEPS:
-            raise StepFailure(
-                f"a step of {step:g} ms would take {count:.3g} substeps of longest_substep_ms = "
-                f"{self._resolution.longest_substep_ms:g}; take shorter communication steps, or longer substeps"
-            )
-        substeps = max(1, ceil(count - 1e-9))
+        substeps = self._resolution.substeps(step)
         progress = Progress(
             np.stack([state[name] for name in ("phi", *self._ionic.states)]),
             state["activation_time"],
@@ -223,6 +240,24 @@ class Electrophysiology(Unit):
         potential = self._scale.rest_potential_mV + self._scale.potential_range_mV * phi
         potential.setflags(write=False)
         return potential
+
+    def _integrated(self, equation: Monodomain, limits: Limits, longest_ms: float) -> Integration | CompiledIntegration:
+        if self._resolution.diffusion_step == "implicit":
+            return compiled(equation, self._ionic, limits) or Integration(equation, self._ionic, limits)
+        # Twice `longest_ms` is where the ionic model's fastest rate alone is unstable.
+        if self._resolution.explicit_limit == "enforced":
+            limit = 2.0 / (fastest_rate(equation) + 1.0 / longest_ms)
+            self._check_substep(limit, "explicit diffusion is unstable on this mesh (diffusion_step: implicit is not)")
+        return Integration(equation, self._ionic, limits, ExplicitSteps(equation))
+
+    def _check_substep(self, longest_ms: float, reason: str) -> None:
+        """InvalidInput for a longest substep above `longest_ms` for a `reason`, unless that is to be seen."""
+        given = self._resolution.longest_substep_ms
+        if given > longest_ms and self._resolution.explicit_limit == "enforced":
+            raise InvalidInput(
+                f"parameter 'longest_substep_ms' is {given:g}; above {longest_ms:.3g} ms {reason}. Take less, or "
+                "explicit_limit: ignored to see it fail"
+            )
 
     @property
     def _lowest_potential(self) -> float:

@@ -1,8 +1,20 @@
 """The theories by name. A new one is a file in this folder and a line here."""
 
+from .active_stress_step import ActiveStressStep
+from .explicit_diffusion import ExplicitDiffusion
+from .feedback import Feedback
 from .pinned_front import PinnedFront
+from .reaction_step import ReactionStep
 from .theory import Theory
+from .two_masses import TwoMasses
 
-_ALL: tuple[Theory, ...] = (PinnedFront(),)
+_ALL: tuple[Theory, ...] = (
+    TwoMasses(),
+    Feedback(),
+    ReactionStep(),
+    ExplicitDiffusion(),
+    ActiveStressStep(),
+    PinnedFront(),
+)
 
 THEORIES: dict[str, Theory] = {theory.name: theory for theory in _ALL}

@@ -23,8 +23,9 @@ class Setting:
     parameters: Mapping[str, Any]
 
     def group(self, kind: type[Group]) -> Group:
-        """The parameters of one group, as that frozen dataclass."""
-        return kind(**{variable.name: self.parameters[variable.name] for variable in parameters_of(kind)})
+        """The values of one group of parameters, as that frozen dataclass; defaults where an FMU has none of them."""
+        names = [variable.name for variable in parameters_of(kind)]
+        return kind(**{name: self.parameters[name] for name in names if name in self.parameters})
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,9 @@ class IonicModel(Protocol):
     def initial(self, phi: FloatArray) -> tuple[FloatArray, ...]:
         """The states of cells at rest of which some are given another potential `phi`, each of the shape of `phi`."""
 
+    def __hash__(self) -> int:
+        """That of its parameters, as a frozen dataclass has it."""
+
     @property
     def rates(self) -> Rates:
         """The rates of φ and of the states in the model's own time, without diffusion and stretch current."""

@@ -1,0 +1,83 @@
+"""A number that answers another one: at once, with a delay, or to its rate. Two of them make the simplest loops.
+
+    y = w + ρ u′,   w = g u + b   or, with a delay,   w′ = ε (g u + b − w)
+
+g is `gain`, b `offset`, ε `delay_rate_per_ms` and ρ `rate_gain_ms`; u′ is the difference of the input over a step by
+the step's length. Two in a loop show what an explicit coupling does with a gain, whatever its step; with a delay, which
+stabilises short steps; and with a dependence on the rate, which long steps stabilise: the loop of active stress and
+mechanics in numbers (Regazzoni & Quarteroni 2021). The step is exact for an input that is held over it, or runs along
+a line.
+
+With a `disturbance` the output is off at the start, so that there is something to grow or to decay.
+
+How it fails: it does not. What grows without bound is the coupling's affair, until it is no number any more.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import exprel
+
+from ..arrays import FloatArray
+from ..input_ramp import InputRamp
+from ..snapshot import State
+from ..unit import Unit
+from ..variable import Causality, Record, Variable, parameter
+
+
+@dataclass(frozen=True)
+class Law:
+    """How the output follows the input."""
+
+    gain: float = parameter(1.0, "1", "g, output per input")
+    offset: float = parameter(0.0, "1", "b, output without input")
+    delay_rate_per_ms: float = parameter(
+        0.0, "1/ms", "epsilon, rate at which the output follows; 0: without delay", at_least=0.0
+    )
+    rate_gain_ms: float = parameter(0.0, "ms", "rho, output per rate of the input, which is taken over a step")
+    disturbance: float = parameter(0.0, "1", "by how much the output is off at the start")
+
+    def target(self, u: FloatArray) -> FloatArray:
+        """g u + b."""
+        return np.asarray(self.gain * u + self.offset)
+
+    def followed(self, w: FloatArray, first: FloatArray, last: FloatArray, step_ms: float) -> FloatArray:
+        """w after a step in which its target runs from `first` to `last`; arrays of any one shape."""
+        if not self.delay_rate_per_ms:
+            return last
+        decay = self.delay_rate_per_ms * step_ms
+        return np.asarray(w - (first - w) * np.expm1(-decay) + (last - first) * (1.0 - exprel(-decay)))
+
+
+class Response(Unit):
+    """A number that follows another: at once, with a delay, or its rate."""
+
+    name = "response"
+    groups = (Law, InputRamp)
+    fields = (
+        Variable("u", Causality.INPUT, "1", "the number that is followed"),
+        Variable("y", Causality.OUTPUT, "1", "the answer", depends_on=("u",), record=Record.VALUE),
+    )
+
+    def prepare(self) -> None:
+        """Take the parameters."""
+        self._law = self.parameters(Law)
+
+    def initial(self, inputs: State) -> dict[str, FloatArray]:
+        """The answer to an input that has been what it is for long, and the disturbance."""
+        delayed = np.asarray(self._law.target(inputs["u"]) + self._law.disturbance)
+        return {"delayed": delayed, "rate_per_ms": np.asarray(0.0), "last": inputs["u"].copy()}
+
+    def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
+        """Exact for an input on a line; in a step of zero length nothing but an answer without delay moves."""
+        law, last = self._law, inputs["u"]
+        delayed = law.followed(state["delayed"], law.target(begin["u"]), law.target(last), step)
+        if step == 0.0:
+            return {**state, "delayed": delayed}
+        # A held input has jumped to where it is since the last step; a ramped one comes from where its ramp begins.
+        first = begin["u"] if self._ramps else state["last"]
+        return {"delayed": delayed, "rate_per_ms": np.asarray((last - first) / step), "last": last.copy()}
+
+    def output(self, name: str, state: State) -> FloatArray:
+        """A scalar."""
+        return np.asarray(state["delayed"] + self._law.rate_gain_ms * state["rate_per_ms"])
