@@ -1,7 +1,7 @@
 """The maps of scenarios/stability in the documentation: some minutes; or `python -m benchmarks.stability NAME`.
 
-Runs what is missing of each study in results/<name>, copies the figure to docs/images/stability, and writes the tables of the
-page.
+Runs what is missing of each study in results/<name>, copies the figure to docs/images/stability, and writes the tables of
+the page.
 """
 
 import argparse
