@@ -1,7 +1,7 @@
 """Where theory has the limit of stability: the points of a map at which the predicted amplification is 1."""
 
 from collections.abc import Callable, Sequence
-from math import exp, floor, inf, log
+from math import exp, floor, inf, isnan, log
 
 import numpy as np
 from contourpy import LineType, contour_generator
@@ -94,8 +94,11 @@ class Limit:
         return self._root(self._x, xs[left], xs[left + 1], lambda x: self._excess(x, y)), y
 
     def _root(self, axis: Axis, low: float, high: float, excess: Callable[[float], float]) -> float:
-        """Where the excess changes its sign between two values; one of them where it is zero there."""
+        """Where the excess changes its sign between two values; one of them where it does not."""
         begin, end = axis.place(low), axis.place(high)
+        below, above = excess(low), excess(high)
+        if (below < 0.0) == (above < 0.0):
+            return low if abs(below) < abs(above) else high
 
         def at(part: float) -> float:
             if part in (0.0, 1.0):
@@ -106,10 +109,11 @@ class Limit:
         def sign(part: float) -> float:
             # Only the sign is known everywhere: amplifications have kinks and jumps.
             value = excess(at(part))
-            return 1.0 if value >= 0.0 else -1.0
+            return -1.0 if value < 0.0 else 1.0
 
-        if sign(0.0) == sign(1.0):
-            return float(low if abs(excess(low)) < abs(excess(high)) else high)
+        if isnan(excess(at(0.5))):
+            # Of whole numbers there is nothing between: the line through both says where it is drawn.
+            return at(below / (below - above))
         return float(at(bisect(sign, 0.0, 1.0, xtol=self._tolerance, rtol=8.9e-16)))
 
 

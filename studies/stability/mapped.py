@@ -8,7 +8,7 @@ from typing import Any
 from ...orchestrator.errors import InputError
 from ..bench import Bench
 from ..machine import machine
-from ..trial import Trial
+from ..trial import BUG, Trial
 from .accuracy import Accuracy
 from .axis import Axis
 from .boundary import Bracket, brackets, middle
@@ -84,8 +84,10 @@ class _Mapping:
     def _cell(self, place: Place, trial: Trial | None) -> Cell:
         if trial is None:
             return Cell(place.x, place.y, NOT_RUN, place.reason, bisected=place.bisected)
-        judgement = self._accuracy.judged(trial, self._references.of(place))
-        verdict = classified(trial, judgement, self._study.growth == _MODES)
+        # Its results are let go with the copy: hundreds of time series are more than need be kept.
+        read = replace(trial)
+        judgement = self._accuracy.judged(read, self._references.of(place))
+        verdict = classified(read, judgement, self._study.growth == _MODES)
         return Cell(
             place.x,
             place.y,
@@ -176,6 +178,11 @@ class _Mapping:
             notes.append(
                 f"infinite error: {infinite} of {len(cells)} cells lack a quantity that their reference has, or have "
                 "one that it lacks"
+            )
+        bugs = sum(cell.reason.startswith(BUG) for cell in cells)
+        if bugs:
+            notes.append(
+                f"{bugs} of {len(cells)} cells ended by an error in this program; their reasons begin with '{BUG}'"
             )
         if len(self._study.references) > 1:
             notes.append("errors are taken from the first reference; the second one is not run for a map")

@@ -86,3 +86,13 @@ def test_a_costly_theory_is_asked_at_the_values_of_the_study() -> None:
     assert all(y == pytest.approx(exp(x), rel=1e-2) for x, y in curve)
     assert {(x, y) for x in _LINEAR.values for y in _LOG.values} <= set(asked)
     assert len(set(asked)) < 16 + 12 * len(curve)
+
+
+def test_between_whole_numbers_the_limit_is_drawn_on_a_line() -> None:
+    def amplification(x: float, y: float) -> float | None:
+        return exp(y - 1.3) if y == round(y) else None
+
+    curves = _limit(_LINEAR, Axis("y", [0, 1, 2, 3]), amplification, costly=True).curves()
+    assert all(y == pytest.approx(1.3) for curve in curves for _, y in curve)
+    assert len(curves) == 1
+    assert _limit(_LINEAR, Axis("y", [0, 1, 2, 3]), amplification, costly=True).at(1.0) == pytest.approx([1.3])
