@@ -21,6 +21,7 @@ for command in (
     scenario_commands.show,
     study_commands.chart,
     study_commands.errors,
+    study_commands.stability,
     study_commands.tune,
 ):
     app.command()(command)

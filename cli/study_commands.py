@@ -1,4 +1,4 @@
-"""`cosim chart`, `cosim tune` and `cosim errors`: studies, which run scenarios many times."""
+"""`cosim chart`, `cosim stability`, `cosim tune` and `cosim errors`: studies, which run scenarios many times."""
 
 import sys
 from collections.abc import Iterator
@@ -62,6 +62,37 @@ def chart(
         typer.echo(f"note: {note}", err=True)
     typer.echo(charted.summary())
     typer.echo(f"  chart in {folder}")
+
+
+def stability(
+    file: Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")],
+    output: Annotated[Path | None, typer.Option(help="Folder of the study; default results/<name>.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    assignments: Assignments = None,
+) -> None:
+    """Map where a scenario is sound over two of its settings, and where it fails, and how.
+
+    With the boundary that a theory predicts, if the study names one. Runs that fail are a result, and the exit code is
+    0. A study that was interrupted goes on where it stopped.
+    """
+    # Imported here, so that help does not wait for numerical libraries.
+    from ..studies.bench import Bench
+    from ..studies.stability import map_study, plan_map, write_map
+    from ..studies.stability.counts import summary
+
+    _one_of(workers, scheduler)
+    plan = plan_map(file, assignments or [])
+    folder = output or Path("results") / plan.study.name
+    console = Console(stderr=True)
+    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+        mapped = map_study(plan, bench)
+        with console.status("drawing the map"):
+            write_map(mapped, folder)
+    for note in mapped.notes:
+        typer.echo(f"note: {note}", err=True)
+    typer.echo(summary(mapped))
+    typer.echo(f"  map in {folder}")
 
 
 def tune(

@@ -15,7 +15,7 @@ from ..orchestrator.participants.unpacked import keep_unpacked
 from ..orchestrator.results.stored_run import StoredRun
 from ..orchestrator.run import run_scenario
 from ..orchestrator.scenario import Scenario
-from .trial import DONE, FAILED, REFUSED, Cost, Trial
+from .trial import BUG, DONE, FAILED, REFUSED, Cost, Trial
 
 #: A run shorter than this, in seconds, is repeated, so often in all.
 _SHORT_S, _RUNS = 1.0, 3
@@ -93,7 +93,7 @@ def _tried(job: Job) -> Trial:
         return Trial(job.folder, FAILED, str(error))
     except Exception as error:
         # A bug, which ends a run with exit code 1; the study's other points are not worse for it.
-        return Trial(job.folder, FAILED, f"a bug: {type(error).__name__}: {error}")
+        return Trial(job.folder, FAILED, f"{BUG}: {type(error).__name__}: {error}")
     summary = StoredRun(job.folder).summary
     costs = [_cost(job.folder)]
     while len(costs) < _RUNS and costs[0].wall_s < _SHORT_S and sum(cost.wall_s for cost in costs[1:]) < job.repeats_s:

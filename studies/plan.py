@@ -18,6 +18,7 @@ from ..orchestrator.scenario import (
     with_settings,
 )
 from .point import Point, told
+from .span import EVERY, STOP, Span, with_steps
 from .study import Line, Settings, Study
 
 
@@ -55,21 +56,27 @@ class Plan:
 
 
 class Variants:
-    """A scenario file with other values at some keys; `origin` stands in front of what is wrong with them."""
+    """A scenario file with other values at some keys; `origin` stands in front of what is wrong with them.
 
-    def __init__(self, file: Path, common: Mapping[str, Any], origin: str) -> None:
+    With `steps` every run has so many communication steps, whatever their size.
+    """
+
+    def __init__(self, file: Path, common: Mapping[str, Any], origin: str, steps: int | None = None) -> None:
         if file.suffix.lower() == ".ssp":
             raise InputError(f"{origin}: {file} is a system package; give the scenario as a YAML file")
         self.file = file
-        self._common = dict(common)
+        self.common = dict(common)
         self._origin = origin
+        self._steps = steps
         try:
             self._content = scenario_content(file)
         except InputError as error:
             raise InputError(f"{origin}: {error}" if origin != str(file) else str(error)) from None
 
-    def scenario(self, settings: Mapping[str, Any], where: str = "") -> Scenario:
+    def scenario(self, settings: Mapping[str, Any], where: str = "", span: Span | None = None) -> Scenario:
         """The scenario with these settings on top of the common ones; `where` says where they stand in the study.
+
+        With a `span` it is as long as that says, however many steps that are.
 
         Raises
         ------
@@ -78,12 +85,16 @@ class Variants:
         InputError
             For a key that there is not, and for a value that it cannot have.
         """
-        both = self._common | dict(settings)
+        both = self.common | dict(settings)
         with_them = f" with {told(both)}" if both else ""
         told_origin = f"{self._origin}: {where}{with_them}" if where else f"{self._origin}{with_them}"
         try:
             self._check_units(both)
             content = with_settings(self._content, both)
+            if span is not None:
+                content = span.set_in(content)
+            elif self._steps is not None:
+                content = with_steps(content, self._steps)
         except InputError as error:
             raise InputError(f"{told_origin}: {error}") from None
         scenario = validated(content, Scenario, told_origin)
@@ -101,9 +112,9 @@ class Variants:
             if section == "units" and len(rest) > 1 and isinstance(units, dict) and rest[0] not in units:
                 raise InputError(f"'{key}': the scenario has no unit '{rest[0]}'{did_you_mean(rest[0], units)}")
 
-    def point(self, settings: Mapping[str, Any], where: str = "") -> Point:
+    def point(self, settings: Mapping[str, Any], where: str = "", span: Span | None = None) -> Point:
         """The same as a point."""
-        return Point(self.scenario(settings, where), self.file.parent, dict(settings))
+        return Point(self.scenario(settings, where, span), self.file.parent, dict(settings))
 
 
 def load_study(path: Path) -> Study:
@@ -113,16 +124,40 @@ def load_study(path: Path) -> Study:
 
 
 def plan_study(path: Path, assignments: Iterable[str] = ()) -> Plan:
-    """The points of the study in `path`, each with the `assignments` (`key.path=value`) too.
+    """The points of the study in `path`, each with the `assignments` (`key.path=value`) too, to be compared.
 
-    InputError for a key that the scenario does not have, a value that none can have, and a line without a valid point.
+    InputError for a key that the scenario does not have, a value that none can have, a line without a valid point, and
+    a study without a reference.
     """
     study = load_study(path)
-    common = study.set | parsed_assignments(assignments)
-    variants = Variants(path.parent / study.scenario, common, str(path))
-    references = [_reference(variants, path, settings) for settings in study.references]
-    lines = {line.name: _planned(variants, line, path) for line in study.lines}
+    if not study.references:
+        raise InputError(
+            f"{path}: the key 'reference' is missing; say what the errors of all points are taken from, the settings "
+            "of a finer run such as {coupling.step_ms: 0.1}, or {results: DIR}"
+        )
+    variants = variants_of(study, path, assignments)
+    lines = {line.name: planned_points(variants, line, path) for line in study.lines}
+    span = None
+    if study.steps is not None:
+        scenarios = [planned.point.scenario for line in lines.values() for planned in line if planned.point]
+        span = Span.around(scenarios)
+    references = [_reference(variants, path, settings, span) for settings in study.references]
     return Plan(study, str(path), references, lines)
+
+
+def variants_of(study: Study, path: Path, assignments: Iterable[str] = ()) -> Variants:
+    """The scenario of the study in `path` with what the study and the `assignments` set for all points.
+
+    InputError where `steps` decides how long runs are, and something else does too.
+    """
+    common = study.set | parsed_assignments(assignments)
+    if study.steps is not None:
+        keys = [*common, *(key for line in study.lines for key in (*line.set, *line.vary))]
+        keys += [key for reference in study.references for key in reference]
+        for key in (STOP, EVERY):
+            if key in keys:
+                raise InputError(f"{path}: '{key}' is given, and `steps` decides it; remove one of the two")
+    return Variants(path.parent / study.scenario, common, str(path), study.steps)
 
 
 def combinations(vary: Mapping[str, Sequence[Any]]) -> list[Settings]:
@@ -130,17 +165,23 @@ def combinations(vary: Mapping[str, Sequence[Any]]) -> list[Settings]:
     return [dict(zip(vary, values, strict=True)) for values in product(*vary.values())]
 
 
-def _reference(variants: Variants, path: Path, settings: Settings) -> Reference:
+def stored_reference(path: Path, settings: Settings) -> Reference:
+    """The reference `{results: DIR}` of the study in `path`."""
+    folder = path.parent / settings["results"]
+    return Reference(f"reference: results: {folder}", folder=folder)
+
+
+def _reference(variants: Variants, path: Path, settings: Settings, span: Span | None) -> Reference:
     if "results" in settings:
-        folder = path.parent / settings["results"]
-        return Reference(f"reference: results: {folder}", folder=folder)
+        return stored_reference(path, settings)
     try:
-        return Reference(f"reference: {told(settings)}", variants.point(settings, "reference"))
+        return Reference(f"reference: {told(settings)}", variants.point(settings, "reference", span))
     except Contradiction as error:
         raise InputError(str(error)) from None
 
 
-def _planned(variants: Variants, line: Line, path: Path) -> list[Planned]:
+def planned_points(variants: Variants, line: Line, path: Path) -> list[Planned]:
+    """The points of a line of the study in `path`; InputError where none of them can be run."""
     where = f"lines, '{line.name}'"
     found = []
     for settings in combinations(line.vary):

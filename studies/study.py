@@ -86,6 +86,15 @@ class Study(_Section):
                 raise ValueError(f"two lines have the name '{name}'; rename one of them")
         return self
 
+    @model_validator(mode="after")
+    def _compared(self) -> "Study":
+        if self.tolerances and not self.reference:
+            raise ValueError(
+                "`tolerances` are of errors, which are taken from a `reference`; give one, {coupling.step_ms: 0.1}, or "
+                "remove `tolerances`"
+            )
+        return self
+
     @property
     def references(self) -> list[Settings]:
         """The one reference, or the two; none where the study has none."""

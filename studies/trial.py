@@ -15,6 +15,9 @@ _FILE = "trial.json"
 
 DONE, FAILED, REFUSED, CRASHED = "done", "failed", "refused", "crashed"
 
+#: How the reason of a run begins that an error in this program ended.
+BUG = "a bug"
+
 
 @dataclass(frozen=True)
 class Cost:

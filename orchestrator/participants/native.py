@@ -1,7 +1,7 @@
 """The one door to the units' floor: meshes, declarations, and units as participants without FMI."""
 
 from collections.abc import Collection, Mapping, Sequence
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,6 +21,8 @@ from ...units.mesh.refinement import check_levels, refined
 from ...units.mesh.wall import wall_warnings
 from ...units.registry import UNITS
 from ...units.snapshot import Snapshot
+from ...units.stability.registry import THEORIES
+from ...units.stability.theory import Coupled, Moment, Setting, Theory
 from ...units.statistics import Statistic
 from ...units.unit import Unit
 from ...units.variable import Causality, Variable
@@ -31,9 +33,14 @@ from .participant import Abilities, Implementation, Parameters, Port, Ports, Ram
 from .ramping import PendingRamps
 
 __all__ = [
+    "Coupled",
     "Mesh",
+    "Moment",
     "NativeParticipant",
+    "Setting",
+    "Theory",
     "accuracy_parameters",
+    "amplification",
     "check_mesh",
     "check_unit",
     "element_quality",
@@ -43,7 +50,9 @@ __all__ = [
     "mesh_warnings",
     "packed_mesh",
     "scene_mesh",
+    "stability_theory",
     "unit_ports",
+    "unit_setting",
     "unit_warnings",
 ]
 
@@ -142,6 +151,39 @@ def _kind(unit: str) -> type[Unit]:
 def is_memoryless(unit: str) -> bool:
     """Whether a unit's outputs follow its inputs at once, as those of an equilibrium do; InputError if it is none."""
     return _kind(unit).memoryless
+
+
+def stability_theory(name: str) -> Theory:
+    """The theory of stability called so; InputError if there is none."""
+    if name not in THEORIES:
+        raise InputError(f"there is no theory '{name}'{did_you_mean(name, THEORIES)}")
+    return THEORIES[name]
+
+
+def unit_setting(unit: str, parameters: Parameters, ramps: bool) -> Setting | None:
+    """A unit as theories see it, with its defaults; None for one that never steps, because its outputs are fixed.
+
+    `ramps` says that the coupling lets inputs run linearly over a step.
+    """
+    kind = _kind(unit)
+    if all(variable.fixed for variable in kind.outputs()):
+        return None
+    declared = {name: variable.start for name, variable in _declared_parameters(unit).items()}
+    linear = {INPUT_INTERPOLATION: "linear"} if ramps and INPUT_INTERPOLATION in declared else {}
+    return Setting(unit, declared | linear | dict(parameters))
+
+
+def amplification(theory: Theory, coupled: Coupled) -> float:
+    """What `theory` says by which factor disturbances grow from one step to the next; NaN where it comes to no result.
+
+    InputError where the theory does not fit the system.
+    """
+    try:
+        return theory.amplification(coupled)
+    except InvalidInput as error:
+        raise InputError(str(error)) from None
+    except StepFailure:
+        return nan
 
 
 def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Ports]:

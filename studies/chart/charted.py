@@ -49,10 +49,15 @@ def _results(reference: Reference, plan: Plan, bench: Bench) -> StoredRun:
                 "are taken from it, so change `reference`"
             )
         return trial.run
+    return stored_results(reference, plan.origin)
+
+
+def stored_results(reference: Reference, origin: str) -> StoredRun:
+    """The results of a reference that are there; InputError, with the `origin` in front, where they are not."""
     run = StoredRun(reference.folder or "")
     if run.summary.get("status") != "done" or not run.columns:
         raise InputError(
-            f"{plan.origin}: {reference.origin}: there are no results of a run that is done; give the folder that "
+            f"{origin}: {reference.origin}: there are no results of a run that is done; give the folder that "
             "`cosim run` wrote, relative to the study's file"
         )
     return run

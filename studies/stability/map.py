@@ -39,6 +39,11 @@ class Cell:
         """Whether its results can be used."""
         return self.kind == SOUND
 
+    @property
+    def is_stable(self) -> bool:
+        """Whether it came to its end and nothing grew; how accurate it is, is another question."""
+        return self.kind in (SOUND, INACCURATE)
+
 
 @dataclass(frozen=True)
 class Crossing:

@@ -119,3 +119,25 @@ def make_signals(study: Path, tmp_path: Path) -> Callable[[str], None]:
         (tmp_path / "signals.csv").write_text(f"time_ms,stretch\n{rows}")
 
     return write
+
+
+def test_so_many_steps_are_runs_of_many_lengths_and_a_reference_as_long_as_the_longest(study: Path) -> None:
+    text = study.read_text().replace("name: steps", "name: steps\nsteps: 6")
+    study.write_text(
+        text.replace("[0.5, 1, 2, 4]", "[0.1, 0.3, 4]").replace("{coupling.step_ms: 0.25}", "{coupling.step_ms: 0.05}")
+    )
+    plan = plan_study(study)
+    assert [point.scenario.run.stop_ms for point in plan.points] == [0.6, 1.8, 24, 6, 12, 24]
+    assert [point.scenario.output.every_ms for point in plan.points] == [0.6, 1.8, 24, 6, 12, 24]
+    reference = plan.references[0].point
+    assert reference is not None
+    # It has outputs when any of them ends.
+    assert (reference.scenario.run.stop_ms, reference.scenario.output.every_ms) == (24, 0.6)
+    assert reference.scenario.coupling.step_ms == 0.05
+
+
+def test_adaptive_coupling_has_no_number_of_steps(study: Path) -> None:
+    text = study.read_text().replace("name: steps", "name: steps\nsteps: 6")
+    study.write_text(text.replace("name: linear\n    set: {", "name: linear\n    set: {coupling.adaptive: {}, "))
+    with pytest.raises(InputError, match=r"lines, 'linear'.*`steps` counts .* `coupling.adaptive` .*; remove one"):
+        plan_study(study)

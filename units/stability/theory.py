@@ -67,7 +67,12 @@ class Coupled:
 
 
 class Theory(Protocol):
-    """What is predicted, and by which formula."""
+    """What is predicted, and by which formula.
+
+    One whose evaluation takes a second or more says `costly = True`, and is asked less often. One that is of steps
+    inside of units, whatever the coupling, says `of_exchange = False`; all others are not asked of coupling that is
+    iterated or adaptive.
+    """
 
     #: Its name, as a study gives it.
     name: ClassVar[str]
