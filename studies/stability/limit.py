@@ -16,7 +16,7 @@ Amplification = Callable[[float, float], float | None]
 _ALONG_X, _ALONG_Y = 3, 41
 
 #: How exactly a limit is found, relative to the distance of the values between which it lies; of costly theories.
-_EXACT, _COARSE = 1e-9, 1e-3
+_EXACT, _COARSE = 1e-7, 1e-3
 
 #: What is above 1 by no more than this is not unstable: modes that neither grow nor decay.
 _MARGINAL = 1e-9

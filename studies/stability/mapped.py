@@ -5,6 +5,8 @@ from dataclasses import replace
 from math import isfinite
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from ...orchestrator.errors import InputError
 from ..bench import Bench
 from ..machine import machine
@@ -29,7 +31,9 @@ def map_study(plan: MapPlan, bench: Bench) -> StabilityMap:
     InputError for a measure that the scenario does not have, for a theory that does not fit it, and for a reference in
     a folder without results.
     """
-    return _Mapping(plan, bench).whole()
+    # The matrices of modes and theories are small: BLAS's threads cost more than they bring.
+    with threadpool_limits(limits=1):
+        return _Mapping(plan, bench).whole()
 
 
 class _Mapping:
