@@ -1,7 +1,7 @@
 """The maps of scenarios/stability in the documentation: some minutes; or `python -m benchmarks.stability NAME`.
 
-Runs what is missing of each study in results/<name>, copies the figure to docs/images/stability, and writes the tables of
-the page.
+Runs what is missing of each study in results/<name>, copies the figure to docs/images/stability, and writes the tables
+of the page.
 """
 
 import argparse
@@ -9,9 +9,8 @@ from pathlib import Path
 from shutil import copyfile
 
 from cardiac_cosim.studies.bench import Bench
-from cardiac_cosim.studies.plan import plan_study
 from cardiac_cosim.studies.point import value_text
-from cardiac_cosim.studies.stability import map_study, write_map
+from cardiac_cosim.studies.stability import map_study, plan_map, write_map
 from cardiac_cosim.studies.stability.map import KINDS, Panel, StabilityMap
 from rich.console import Console
 
@@ -25,7 +24,7 @@ _IMAGES = _ROOT / "docs" / "images" / "stability"
 
 def stability_map(name: str) -> StabilityMap:
     """Map a study of that name, and put its figure into the documentation."""
-    plan = plan_study(STUDIES / f"{name}.yaml")
+    plan = plan_map(STUDIES / f"{name}.yaml")
     folder = _ROOT / "results" / plan.study.name
     with Bench(folder, Console()) as bench:
         found = map_study(plan, bench)

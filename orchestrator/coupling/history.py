@@ -3,6 +3,8 @@
 from collections import deque
 from collections.abc import Sequence
 
+import numpy as np
+
 from ..participants.participant import Values
 
 _Sample = tuple[float, Values]
@@ -24,8 +26,10 @@ class History:
         samples = list(self._samples)[: order + 1]
         if len(samples) == 1:
             return samples[0][1]
-        terms = [weight * values for weight, (_, values) in zip(_weights(samples, time), samples, strict=True)]
-        return sum(terms[1:], start=terms[0])
+        # Values of a run that diverges leave the numbers; whoever is given one that is not finite says so.
+        with np.errstate(over="ignore", invalid="ignore"):
+            terms = [weight * values for weight, (_, values) in zip(_weights(samples, time), samples, strict=True)]
+            return sum(terms[1:], start=terms[0])
 
     def curvature(self) -> Values:
         """Second time derivative in 1/s² of the parabola through the last three values; zero while there are fewer."""
