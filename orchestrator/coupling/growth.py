@@ -16,12 +16,13 @@ that moves on by more than its own width in every step has −1/2, in the mean o
 independent from step to step has −2/3.
 
 A field is told of (`Alternation`) when it has alternated in each of eight steps, at a steady rate and by more than a
-millionth of its motion. Divergence that does not alternate, of a loop of gain above 1, cannot be told from a
-field that has to grow, as in an upstroke, and is not looked for.
+millionth of its motion. In a loop that is iterated it has to be a hundredth of the motion: what the criteria let pass
+in one sweep is coupled explicitly, and grows as far as they do, but no further. Divergence that does not alternate, of
+a loop of gain above 1, cannot be told from a field that has to grow, as in an upstroke, and is not looked for.
 """
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from math import exp, log
@@ -74,6 +75,9 @@ class _Proof:
 #: Alternations by less than a millionth of the motion may come from the tolerances inside of units.
 _PROOF = _Proof(steps=8, steady=1.3, rate=0.0, share=1e-6)
 
+#: The same in a loop that is iterated.
+_PLAIN_PROOF = replace(_PROOF, share=1e-2)
+
 #: What is enough in a run that has failed, which may not have had the time for more.
 _SUSPICION = _Proof(steps=3, steady=1.5, rate=1.2, share=1e-2)
 
@@ -81,19 +85,27 @@ _SUSPICION = _Proof(steps=3, steady=1.5, rate=1.2, share=1e-2)
 class Growth:
     """Follows all fields that are exchanged in every step and move continuously, of the `participants` connected.
 
+    Of the fields `solved` ("unit.field") loops are iterated.
+
     Attributes
     ----------
     names:
         The fields, "unit.field", in the order of the connections.
     """
 
-    def __init__(self, participants: Mapping[str, Participant], connections: Iterable[Connection]) -> None:
+    def __init__(
+        self,
+        participants: Mapping[str, Participant],
+        connections: Iterable[Connection],
+        solved: Collection[str] = (),
+    ) -> None:
         self._tracks: dict[End, _Track] = {}
         for link in connections:
             port = participants[link.source.unit].outputs[link.source.name]
             once = port.fixed or participants[link.target.unit].inputs[link.target.name].fixed
             if port.is_real and not port.discrete and not once:
-                self._tracks.setdefault(link.source, _Track())
+                proof = _PLAIN_PROOF if str(link.source) in solved else _PROOF
+                self._tracks.setdefault(link.source, _Track(proof))
         self.names = [str(end) for end in self._tracks]
 
     def begin(self, exchange: Exchange) -> None:
@@ -141,7 +153,8 @@ class Growth:
 class _Track:
     """The last values of one field, their last bends, and for how long these have been opposite."""
 
-    def __init__(self) -> None:
+    def __init__(self, proof: _Proof) -> None:
+        self._proof = proof
         self.worst: Alternation | None = None
         self._present: Alternation | None = None
         # Newest first: the last two values, the directions of the last bends (zero without a bend), and their lengths.
@@ -271,7 +284,7 @@ class _Track:
 
     def _tell(self, time_ms: float) -> None:
         """Judge the last steps; those that go on as before are one stretch."""
-        found, before = self._judged(_PROOF, time_ms), self._present
+        found, before = self._judged(self._proof, time_ms), self._present
         if found is not None and before is not None and _alike(found, before):
             found = replace(found, rate=max(found.rate, before.rate), from_ms=before.from_ms)
         self._present = found

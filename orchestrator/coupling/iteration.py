@@ -98,6 +98,10 @@ class Iterated:
         carried = self._scheme.carried(loop, links)
         return {str(end): end in carried for end in _sources(links)}
 
+    def solved(self, units: Sequence[str]) -> set[str]:
+        """See Scheme: those of all loops."""
+        return {name for group in self.groups(units) if group.is_loop for name in self.fields(group.units)}
+
     def settle(self, group: Sequence[str], exchange: Exchange, complete: Callable[[], None]) -> Sweeps:
         """See Scheme; NotConverged as for a step. Sweeps are those of Gauss–Seidel, whatever makes those of steps."""
         links = inside(group, self._connections)

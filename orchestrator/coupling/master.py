@@ -121,7 +121,8 @@ class Master:
         self.connections = connections
         self.units = stepping_order(participants, order)
         self.exchange = Exchange(participants, connections, inputs)
-        self.growth = Growth(participants, connections)
+        solved = scheme.solved(self.units)
+        self.growth = Growth(participants, connections, solved)
         self.diagnosis = Diagnosis(participants, connections, self.units, scheme, self.exchange.extrapolation)
         self.watch = Stopwatch()
         self.solves: Counter[str] = Counter()
