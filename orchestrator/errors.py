@@ -15,10 +15,14 @@ class InputError(Exception):
 class RunError(Exception):
     """The physics, the coupling or the operating system failed (exit code 3).
 
-    The message says which unit, when, why and what to try. Where an iteration failed, `sweeps` are those
-    (coupling.schemes.Sweeps) of the step to `time_ms` that was not accepted.
+    The message says which unit, when, why and what to try. `kind` is what failed: a `unit`, then its name is `unit`;
+    the `coupling`; the `results`, which cannot be written; or none of these, a unit has `terminated` the simulation.
+    `time_ms` is the end of the step that was not accepted, where it was one. Where an iteration failed, `sweeps` are
+    those (coupling.schemes.Sweeps) of that step.
     """
 
+    kind: str = "coupling"
+    unit: str | None = None
     time_ms: float | None = None
     sweeps: Any = None
 

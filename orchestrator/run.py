@@ -3,13 +3,14 @@
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from threadpoolctl import threadpool_limits
 
+from .alarm import Alarm
 from .assembly import assemble, called_directly, checked_mesh
 from .costs import Costs
 from .coupling.master import Observer
@@ -30,7 +31,7 @@ MeshOf = Callable[[Scenario, Path], Mesh | None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The results folder of a run and its summary; `warnings` are what could not be done beside."""
+    """The results folder of a run and its summary; `warnings` tell what is wrong with it, or was not done beside."""
 
     folder: Path
     summary: dict[str, Any]
@@ -72,13 +73,15 @@ def run_scenario(
         drawing = stack.enter_context(Drawing(output)) if figures else None
         summary = folder.complete() if resume else None
         if summary is None:
-            summary = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing, mesh_of)
-        elif drawing is not None:
-            drawing.begin()
+            outcome = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing, mesh_of)
+        else:
+            outcome = Outcome(output, summary)
+            if drawing is not None:
+                drawing.begin()
         if drawing is None:
-            return Outcome(output, summary)
+            return outcome
         with console.status("drawing the figures"):
-            return Outcome(output, summary, drawing.finish())
+            return replace(outcome, warnings=(*outcome.warnings, *drawing.finish()))
 
 
 def _run(
@@ -91,7 +94,7 @@ def _run(
     started: float,
     drawing: Drawing | None,
     mesh_of: MeshOf,
-) -> dict[str, Any]:
+) -> Outcome:
     before = folder.checkpoint() if resume else None
     mesh = mesh_of(scenario, base)
     with ExitStack() as stack:
@@ -125,7 +128,7 @@ def _run(
         with recording, bar:
             if unready is not None:
                 raise unready
-            observers: list[Observer] = [recording, bar]
+            observers: list[Observer] = [recording, bar, Alarm(master.growth, master.diagnosis, console)]
             master.run([*observers, drawing] if drawing is not None else observers, stop)
             if stop.signal is not None and not master.done:
                 recording.keep()
@@ -133,7 +136,7 @@ def _run(
         # All results are there; the participants are closed while the figures are drawn.
         if drawing is not None:
             drawing.begin()
-    return recording.summary
+    return Outcome(folder.path, recording.summary, tuple(recording.diagnosis))
 
 
 def _warn(console: Console, warnings: Iterable[str]) -> None:

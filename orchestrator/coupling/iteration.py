@@ -19,6 +19,7 @@ from .connections import Connection, End
 from .convergence import Convergence, Criterion
 from .exchange import Exchange
 from .loops import Group, groups_in_order, inside
+from .norm import norm
 from .rollback import Rollback
 from .schemes import GaussSeidel, Step, Sweep, Sweeps
 
@@ -97,6 +98,10 @@ class Iterated:
         carried = self._scheme.carried(loop, links)
         return {str(end): end in carried for end in _sources(links)}
 
+    def solved(self, units: Sequence[str]) -> set[str]:
+        """See Scheme: those of all loops."""
+        return {name for group in self.groups(units) if group.is_loop for name in self.fields(group.units)}
+
     def settle(self, group: Sequence[str], exchange: Exchange, complete: Callable[[], None]) -> Sweeps:
         """See Scheme; NotConverged as for a step. Sweeps are those of Gauss–Seidel, whatever makes those of steps."""
         links = inside(group, self._connections)
@@ -138,7 +143,9 @@ class Iterated:
         """Repeat `sweep` until what the `links` carry has converged; the history of it is added to those `before`."""
         interface = _sources(links)
         exact = [str(end) for end in interface if not self._is_real(end)]
-        convergence = Convergence(self._limits.criteria, [str(end) for end in carried], exact)
+        # A change comes round by the units whose outputs wait for the next sweep, one unit in a sweep.
+        round_sweeps = len({end.unit for end in carried})
+        convergence = Convergence(self._limits.criteria, [str(end) for end in carried], exact, round_sweeps)
         # Truth values, whole numbers and texts are taken as they come.
         carried = [end for end in carried if str(end) not in exact]
         self._acceleration.begin()
@@ -183,7 +190,7 @@ class Iterated:
 
     def _rescale(self, values: Mapping[End, Values]) -> None:
         """Fields count relative to their magnitude, fixed over a step and renewed when it has changed much."""
-        scales = {end: float(np.linalg.norm(value)) or 1.0 for end, value in values.items()}
+        scales = {end: norm(value) or 1.0 for end, value in values.items()}
         known = self._scales
         if any(not 1.0 / _RESCALED < scale / known.get(end, np.inf) < _RESCALED for end, scale in scales.items()):
             self._scales = known | scales
@@ -207,7 +214,7 @@ class Iterated:
     ) -> NotConverged:
         rate = convergence.contraction_rate
         lines = []
-        for name in convergence.open():
+        for name in convergence.open() or residuals:
             residual = np.atleast_1d(residuals[name])
             where = np.unravel_index(int(np.abs(residual).argmax()), residual.shape)
             lines.append(

@@ -26,7 +26,9 @@ from ..errors import (
 from ..participants.participant import Participant, Wait
 from ..stopwatch import Moment, Span, Stopwatch, Usage, seconds_by_label
 from .connections import Connection
+from .diagnosis import Diagnosis
 from .exchange import Exchange, Inputs, blaming
+from .growth import Growth
 from .loops import groups_in_order
 from .missed_tolerance import Missed
 from .rollback import Rollback
@@ -63,6 +65,8 @@ class Accepted:
     is_output: bool = True
     #: Units that did not step in this exchange: their outputs are those of an earlier time.
     waiting: frozenset[str] = frozenset()
+    #: By exchanged field, the factor by which its alternation from step to step grows (`growth`).
+    growth: Mapping[str, float | None] = field(default_factory=dict)
 
 
 class Observer(Protocol):
@@ -90,6 +94,10 @@ class Master:
 
     Attributes
     ----------
+    growth:
+        Which exchanged fields alternate from step to step, and how fast that grows.
+    diagnosis:
+        What is to be told of them.
     solves:
         How many steps each unit was asked to take, those of sweeps that were repeated and of steps that were refused
         or failed included.
@@ -113,6 +121,9 @@ class Master:
         self.connections = connections
         self.units = stepping_order(participants, order)
         self.exchange = Exchange(participants, connections, inputs)
+        solved = scheme.solved(self.units)
+        self.growth = Growth(participants, connections, solved)
+        self.diagnosis = Diagnosis(participants, connections, self.units, scheme, self.exchange.extrapolation)
         self.watch = Stopwatch()
         self.solves: Counter[str] = Counter()
         self.sweeps = 0
@@ -158,6 +169,7 @@ class Master:
                         self._begin(unit)
                         self.exchange.feed(unit, initially=True)
                         self._complete(unit)
+        self.growth.begin(self.exchange)
         self._initialised = True
 
     def run(self, observers: Sequence[Observer], stop: Any = False) -> None:
@@ -172,7 +184,7 @@ class Master:
                 self._show(Accepted(0, 0.0, 0.0, self._settled, spans=self.watch.lap()), observers)
         while not self.done and not stop:
             accepted = self._take_step()
-            with _failing(*_told(accepted.time_ms - accepted.size_ms, accepted.time_ms)):
+            with _failing(*_told(accepted.time_ms - accepted.size_ms, accepted.time_ms), accepted.time_ms):
                 self._show(accepted, observers)
 
     # --- checkpoints --------------------------------------------------------------------------------------------------
@@ -197,6 +209,7 @@ class Master:
             "exchange": self.exchange.memory(),
             "scheme": self._scheme.memory(),
             "control": self._control.memory(),
+            "growth": self.growth.memory(),
         }
 
     def resume(self, memory: Mapping[str, Any]) -> None:
@@ -213,8 +226,13 @@ class Master:
         self.exchange.resume(memory["exchange"])
         self._scheme.resume(memory.get("scheme", {}))
         self._control.resume(memory.get("control", {}))
+        self.growth.resume(memory["growth"])
 
     # --- inside -------------------------------------------------------------------------------------------------------
+
+    def _suspicions(self) -> list[str]:
+        """What alternated before a step failed."""
+        return self.diagnosis.paragraphs(self.growth.suspected)
 
     @contextmanager
     def _initialising(self, label: str) -> Iterator[None]:
@@ -262,7 +280,7 @@ class Master:
                 ticks = self._control.next(self._tick)
                 begin, end = self._timeline.time_ms(self._tick), self._timeline.time_ms(self._tick + ticks)
                 units = self._due(ticks)
-                with _failing(*_told(begin, end, causes), end):
+                with _failing(*_told(begin, end, causes, self._suspicions), end):
                     attempt = self._attempt(units, ticks, end, causes)
                 if attempt is not None:
                     break
@@ -271,6 +289,7 @@ class Master:
             self._tick += ticks
             self._number += 1
             self.exchange.accept(units)
+            growth = self.growth.add(self.exchange)
             for unit in self.units:
                 self._passed[unit] += 1
             for unit in units:
@@ -290,6 +309,7 @@ class Master:
             spans,
             self._timeline.is_output(self._tick),
             frozenset(self.units) - frozenset(units),
+            growth,
         )
 
     def _attempt(
@@ -366,12 +386,20 @@ class Master:
             observer.accept(step, self.exchange)
 
 
-def _told(begin_ms: float, end_ms: float, causes: Mapping[str, str] | None = None) -> tuple[str, Callable[[], str]]:
-    """When a step failed, and what is left; with why longer steps were given up before, as `causes` know by then."""
+def _told(
+    begin_ms: float,
+    end_ms: float,
+    causes: Mapping[str, str] | None = None,
+    suspicions: Callable[[], Sequence[str]] = tuple,
+) -> tuple[str, Callable[[], str]]:
+    """When a step failed, and what is left; with why longer steps were given up before, as `causes` know by then.
+
+    `suspicions` are paragraphs on what may have led to it.
+    """
 
     def left() -> str:
         earlier = "".join(f"; before that {cause}" for cause in (causes or {}).values())
-        return f"{earlier}. The results up to {begin_ms:g} ms are complete"
+        return ". ".join([f"{earlier}. The results up to {begin_ms:g} ms are complete", *suspicions()])
 
     return f"failed in the step from {begin_ms:g} to {end_ms:g} ms", left
 
@@ -387,17 +415,19 @@ def _failing(when: str, left: Callable[[], str] = str, time_ms: float | None = N
     try:
         yield
     except ParticipantTerminated as error:
-        raise _at(time_ms, Terminated(f"unit '{error.unit}' ended the simulation: {error}{left()}")) from error
+        ended = Terminated(f"unit '{error.unit}' ended the simulation: {error}{left()}")
+        raise _about(ended, "terminated", time_ms, error.unit) from error
     except ParticipantError as error:
-        raise _at(time_ms, RunError(f"unit '{error.unit}' {when}: {error}{left()}")) from error
+        failed = RunError(f"unit '{error.unit}' {when}: {error}{left()}")
+        raise _about(failed, "unit", time_ms, error.unit) from error
     except NotConverged as error:
-        failure = _at(time_ms, RunError(f"the coupling {when}: {error}{left()}"))
-        failure.sweeps = error.sweeps
-        raise failure from error
+        missed = _about(RunError(f"the coupling {when}: {error}{left()}"), "coupling", time_ms)
+        missed.sweeps = error.sweeps
+        raise missed from error
 
 
-def _at(time_ms: float | None, error: RunError) -> RunError:
-    error.time_ms = time_ms
+def _about(error: RunError, kind: str, time_ms: float | None, unit: str | None = None) -> RunError:
+    error.kind, error.time_ms, error.unit = kind, time_ms, unit
     return error
 
 

@@ -64,6 +64,9 @@ class Scheme(Protocol):
         `complete` lets them leave it, and collects their outputs.
         """
 
+    def solved(self, units: Sequence[str]) -> set[str]:
+        """The fields ("unit.field") that `units` exchange in loops which it solves in every step."""
+
     def memory(self) -> dict[str, Any]:
         """What it has learned, for a checkpoint."""
 
@@ -87,6 +90,10 @@ class _Explicit:
         """See Scheme."""
         complete()
         return Sweeps()
+
+    def solved(self, units: Sequence[str]) -> set[str]:
+        """See Scheme: none."""
+        return set()
 
     def memory(self) -> dict[str, Any]:
         """See Scheme."""

@@ -1,4 +1,4 @@
-"""coupling.csv: what each accepted step cost."""
+"""coupling.csv: how each accepted step went, and what it cost."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +16,9 @@ class CouplingLog:
     """A row per accepted step: step size, sweeps, residuals, rejections and seconds by unit.
 
     `converged` names the fields that iterated loops exchange ("unit.field"); each has a column with its last residual.
-    `contraction_rate` is empty where one sweep measures no rate. Where steps are `adaptive`, `error` is the estimated
+    `contraction_rate` is empty where one sweep measures no rate. `alternating` names the exchanged fields that may
+    alternate; each has a column with the factor by which that grows (coupling.growth), 0 where it does not alternate,
+    empty where too little is known or the field is not new. Where steps are `adaptive`, `error` is the estimated
     error over the tolerance, empty where there is none, and `tolerance_missed` is 1 where it is above and the step
     could not be any shorter. `resumed` is the `memory` of an earlier run.
     """
@@ -28,14 +30,18 @@ class CouplingLog:
         converged: Sequence[str] = (),
         resumed: Mapping[str, Any] | None = None,
         adaptive: bool = False,
+        alternating: Sequence[str] = (),
     ) -> None:
         self._units = units
         self._converged = converged
+        self._alternating = alternating
         self._adaptive = adaptive
         residuals = [f"residual_{name}" for name in converged]
         seconds = [f"seconds_{unit}" for unit in (*units, MASTER)]
         judged = ["error", "tolerance_missed"] if adaptive else []
-        columns = ["time_ms", "step_ms", "iterations", *residuals, "contraction_rate", "rejected", *judged, *seconds]
+        growth = [f"growth_{name}" for name in alternating]
+        first = ["time_ms", "step_ms", "iterations", *residuals, "contraction_rate", *growth]
+        columns = [*first, "rejected", *judged, *seconds]
         self._table = Table(folder / COUPLING, columns, resumed and resumed["table"])
         times = [float(row[0]) for row in self._table.rows()]
         self._rows = len(times)
@@ -58,9 +64,10 @@ class CouplingLog:
             # A loop one of whose units did not step in this exchange was none.
             norms = sweeps.residuals
             residuals = [norms.get(name) for name in self._converged]
-            first = [step.time_ms, step.size_ms, sweeps.iterations, *residuals, sweeps.contraction_rate, step.rejected]
+            growth = [step.growth.get(name) for name in self._alternating]
+            first = [step.time_ms, step.size_ms, sweeps.iterations, *residuals, sweeps.contraction_rate, *growth]
             judged = [step.error, int(step.missed)] if self._adaptive else []
-            self._table.add([*first, *judged, *seconds])
+            self._table.add([*first, step.rejected, *judged, *seconds])
             if not sweeps.converged:
                 self._note(step.time_ms)
             self._rows += 1

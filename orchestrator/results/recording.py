@@ -56,6 +56,8 @@ class Recording:
     ----------
     summary:
         The content of the summary, once the recording is over.
+    diagnosis:
+        What is to be told of fields that alternated from step to step, known then.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class Recording:
         implementations: Mapping[str, Implementation],
     ) -> None:
         self.summary: dict[str, Any] = {}
+        self.diagnosis: list[str] = []
         self._refusal: RunError | None = None
         self._folder, self._origin, self._assembly = folder, origin, assembly
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
@@ -92,7 +95,7 @@ class Recording:
             series = TimeSeries(folder, participants, assembly.probes, kept("series"))
             self._series: TimeSeries = add("series", series)
             converged, adaptive = list(assembly.converged), scenario.coupling.adaptive is not None
-            log = CouplingLog(folder, master.units, converged, kept("log"), adaptive)
+            log = CouplingLog(folder, master.units, converged, kept("log"), adaptive, master.growth.names)
             self._log: CouplingLog = add("log", log)
             if converged:
                 self._iterations = add("iterations", IterationLog(folder, converged, kept("iterations")))
@@ -153,11 +156,16 @@ class Recording:
         resumable = self._checkpoint.exists and not done
         if isinstance(error, Interrupted):
             error.resumable = resumable
+        master = self._assembly.master
+        growth = master.growth.suspected if isinstance(ending, RunError) else master.growth.found
+        self.diagnosis = master.diagnosis.paragraphs(growth)
+        slower = implementation.fallbacks(self._implementations.values())
         outcome = _outcome(ending) | {
             "unconverged_ms": self._log.unconverged,
-            "tolerance_missed": asdict(self._assembly.master.missed),
+            "tolerance_missed": asdict(master.missed),
+            "growth": {name: asdict(alternation) for name, alternation in growth.items()},
             "resumable": resumable,
-            "warnings": [*self._assembly.warnings, *implementation.fallbacks(self._implementations.values())],
+            "warnings": [*self._assembly.warnings, *slower, *self.diagnosis],
             "implementation": implementation.texts(self._implementations),
         }
         scenario, costs = self._assembly.scenario, self._costs.content()
@@ -197,12 +205,15 @@ class Recording:
         if isinstance(error, SystemExit):
             # Whatever code it chose: the process is not to end as if the run were done.
             error = RunError(f"something that the run called ended the process (exit code {error.code})")
+            error.kind = "unit"
         bugs = [problem for problem in problems if not isinstance(problem, OSError)]
         # Where the operating system has refused once, nobody need be told of every file again.
         if not problems or (error is self._refusal is not None and not bugs):
             return error
         if isinstance(error, RunError):
-            return RunError(f"{error}; besides, {'; '.join(_told(problem) for problem in problems)}")
+            besides = RunError(f"{error}; besides, {'; '.join(_told(problem) for problem in problems)}")
+            besides.kind, besides.unit, besides.time_ms = error.kind, error.unit, error.time_ms
+            return besides
         if error is None or isinstance(error, Interrupted):
             return bugs[0] if bugs else self._refused(problems[0])
         for problem in problems:
@@ -212,20 +223,25 @@ class Recording:
     def _refused(self, error: Exception) -> RunError:
         rows = self._series.rows
         reached = f". The results up to {rows[-1][0]:g} ms are complete" if rows else ""
-        return RunError(
+        refused = RunError(
             f"the results cannot be written ({_told(error)}){reached}; make room, or give back what was taken away, "
             "and go on with --resume"
         )
+        refused.kind, refused.time_ms = "results", float(rows[-1][0]) if rows else None
+        return refused
 
 
 def _outcome(error: BaseException | None) -> dict[str, Any]:
-    """Status and message of a run that ended with `error`."""
+    """Status and message of a run that ended with `error`, and what failed in one that failed."""
     if error is None:
         return {"status": "done"}
     status = next((status for kind, status in _STATUS.items() if isinstance(error, kind)), None)
     if status is None:
         return {"status": "crashed", "message": f"{type(error).__name__}: {error}"}
-    return {"status": status} if status == "interrupted" else {"status": status, "message": str(error)}
+    if status == "interrupted":
+        return {"status": status}
+    failed = {"kind": error.kind, "unit": error.unit, "time_ms": error.time_ms} if isinstance(error, RunError) else None
+    return {"status": status, "message": str(error)} | ({} if failed is None else {"failure": failed})
 
 
 def _told(problem: Exception) -> str:

@@ -22,6 +22,7 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
     "ejection_fraction": dict,
     "unconverged_ms": list,
     "tolerance_missed": dict,
+    "growth": dict,
     "warnings": list,
     "wall_s": dict,
     "cpu_s": dict,
