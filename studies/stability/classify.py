@@ -7,7 +7,7 @@ The rules, the first that fits counts:
    *diverged* if disturbances had been growing, and *unit failed* otherwise, as where a process died or a unit ended it.
 3. A run with steps that were accepted without having converged is *not converged*.
 4. A run in which disturbances grew is *oscillating* where they alternate between exchanges, and *diverged* where they
-   do not. Alternating ones that ring on without being damped count too.
+   do not. So is one that rings on: alternating disturbances last to its end and keep half of their amplitude.
 5. A run that errs by more than a tolerance is *inaccurate*.
 6. All others are *sound*.
 
@@ -29,6 +29,9 @@ _GROWING, _RINGING, _DECAYING = "growing", "ringing", "decaying"
 
 #: What ended a run, as summaries have it.
 _COUPLING, _RESULTS = "coupling", "results"
+
+#: The part of its amplitude that a disturbance keeps to the end of a run that rings on.
+_KEPT = 0.5
 
 #: Characters of a reason.
 _LONGEST = 240
@@ -98,7 +101,7 @@ def _accurate(judgement: Judgement, growth: _Growth) -> Verdict:
 
 
 def _growth(trial: Trial, by_modes: bool) -> _Growth:
-    measured = _of_fields(trial.run.summary.get("growth") or {})
+    measured = _of_fields(trial.run.summary)
     if not by_modes:
         return measured
     modes = fitted_modes(trial.run.columns)
@@ -115,21 +118,29 @@ def _told(modes: Modes) -> str:
     return f"a disturbance grows by a factor of {modes.radius:.6g} from one exchange to the next{turn}"
 
 
-def _of_fields(fields: Mapping[str, Mapping[str, Any]]) -> _Growth:
-    """From `growth` of a summary: the field of the worst kind, and among those the one of the largest rate."""
+def _of_fields(summary: Mapping[str, Any]) -> _Growth:
+    """From a run's summary: the field of the worst kind, and among those the one of the largest rate."""
+    fields: Mapping[str, Mapping[str, Any]] = summary.get("growth") or {}
     for kind in (_GROWING, _RINGING, _DECAYING):
-        of_kind = {name: entry for name, entry in fields.items() if entry.get("kind") == kind}
+        of_kind = {name: entry for name, entry in fields.items() if entry["kind"] == kind}
         if of_kind:
             name = max(of_kind, key=lambda each: float(of_kind[each]["rate"]))
-            rate, period = float(of_kind[name]["rate"]), of_kind[name].get("period_steps")
-            alternates = f"alternates with a period of {period} steps" if period else "alternates from step to step"
-            said = {
-                _GROWING: f"{name} {alternates} and grows by a factor of {rate:.4g} per step",
-                _RINGING: f"{name} {alternates} and rings on, by a factor of {rate:.4g} per step",
-                _DECAYING: "",
-            }
-            return _Growth(rate, said[kind], kind == _GROWING, kind != _DECAYING)
+            entry = of_kind[name]
+            alternates = f"{name} alternates with a period of {entry['period_steps']} steps"
+            rate = float(entry["rate"])
+            if kind == _GROWING:
+                return _Growth(rate, f"{alternates} and grows by a factor of {rate:.4g} per step", True, True)
+            if kind == _RINGING and _lasts(entry, summary):
+                return _Growth(rate, f"{alternates} and rings on, by a factor of {rate:.4g} per step", False, True)
+            return _Growth(rate)
     return _Growth()
+
+
+def _lasts(entry: Mapping[str, Any], summary: Mapping[str, Any]) -> bool:
+    """Whether what rings goes on to the end of the run, and keeps its amplitude meanwhile."""
+    step = float(summary["end_ms"]) / int(summary["steps"])
+    goes_on = float(entry["to_ms"]) > float(summary["end_ms"]) - 1.5 * step
+    return goes_on and float(entry["rate"]) ** ((float(entry["to_ms"]) - float(entry["from_ms"])) / step) > _KEPT
 
 
 def _first_sentence(text: str) -> str:

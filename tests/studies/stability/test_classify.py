@@ -19,7 +19,10 @@ from cardiac_cosim.studies.stability.map import (
 from cardiac_cosim.studies.trial import CRASHED, DONE, FAILED, REFUSED, Trial
 
 _GROWING = {"mechanics.stretch": {"kind": "growing", "rate": 1.3, "period_steps": 2}}
-_RINGING = {"mechanics.stretch": {"kind": "ringing", "rate": 0.97, "period_steps": 4}}
+_END = {"steps": 40, "end_ms": 80.0}
+_RINGING = {"mechanics.stretch": {"kind": "ringing", "rate": 0.97, "period_steps": 4, "from_ms": 40.0, "to_ms": 80.0}}
+_ENDING = {"mechanics.stretch": _RINGING["mechanics.stretch"] | {"from_ms": 20.0, "to_ms": 60.0}}
+_FADING = {"mechanics.stretch": _RINGING["mechanics.stretch"] | {"from_ms": 10.0}}
 _DECAYING = {"mechanics.stretch": {"kind": "decaying", "rate": 0.4, "period_steps": 2}}
 _UNIT = {"kind": "unit", "unit": "mechanics", "time_ms": 12.0}
 _MESSAGE = "unit 'mechanics' failed in the step from 12 to 13 ms: an element is inverted; shorter steps may help. More"
@@ -47,15 +50,23 @@ def _verdict(
         (DONE, {}, SOUND, None, []),
         (DONE, {"growth": {}}, SOUND, None, []),
         (DONE, {"growth": _DECAYING}, SOUND, 0.4, []),
-        (DONE, {"growth": _DECAYING | {"a.b": {"kind": "growing", "rate": 1.01}}}, OSCILLATING, 1.01, ["a.b"]),
+        (
+            DONE,
+            {"growth": _DECAYING | {"a.b": {"kind": "growing", "rate": 1.01, "period_steps": 2}}},
+            OSCILLATING,
+            1.01,
+            ["a.b"],
+        ),
         (DONE, {"growth": _GROWING}, OSCILLATING, 1.3, ["mechanics.stretch", "grows", "1.3", "period of 2 steps"]),
-        (DONE, {"growth": _RINGING}, OSCILLATING, 0.97, ["rings on", "0.97", "period of 4 steps"]),
+        (DONE, _END | {"growth": _RINGING}, OSCILLATING, 0.97, ["rings on", "0.97", "period of 4 steps"]),
+        (DONE, _END | {"growth": _ENDING}, SOUND, 0.97, []),
+        (DONE, _END | {"growth": _FADING}, SOUND, 0.97, []),
         (DONE, {"unconverged_ms": [4.0, 5.0], "steps": 20}, NOT_CONVERGED, None, ["2 of 20 steps", "first to 4 ms"]),
         (DONE, {"unconverged_ms": [4.0], "steps": 9, "growth": _GROWING}, NOT_CONVERGED, 1.3, ["grows"]),
         (FAILED, {"failure": _UNIT}, UNIT_FAILED, None, ["an element is inverted"]),
         (FAILED, {"failure": _UNIT, "growth": _DECAYING}, UNIT_FAILED, 0.4, ["an element is inverted"]),
         (FAILED, {"failure": _UNIT, "growth": _GROWING}, DIVERGED, 1.3, ["an element is inverted", "grows", "1.3"]),
-        (FAILED, {"failure": _UNIT, "growth": _RINGING}, UNIT_FAILED, 0.97, ["rings on"]),
+        (FAILED, _END | {"failure": _UNIT, "growth": _RINGING}, UNIT_FAILED, 0.97, ["rings on"]),
         (FAILED, {"growth": _GROWING}, DIVERGED, 1.3, ["grows"]),
         (FAILED, {}, UNIT_FAILED, None, ["an element is inverted"]),
         (FAILED, {"failure": {"kind": "coupling"}}, NOT_CONVERGED, None, ["an element is inverted"]),
