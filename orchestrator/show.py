@@ -129,7 +129,16 @@ def _absent(participants: Mapping[str, Participant], connections: Sequence[Conne
             if not port.live:
                 yield f"{name}.{port.name}: {port.needs} of the unit is 0, so it has no influence and is not connected"
             elif (name, port.name) not in fed and not _fed_in_part(name, port, fed):
-                yield f"{name}.{port.name}: no unit gives it, so it keeps its start value"
+                yield f"{name}.{port.name}: {_unfed(port, participants)}, so it keeps its start value"
+
+
+def _unfed(port: Port, participants: Mapping[str, Participant]) -> str:
+    """Why no output of its name feeds an input."""
+    for name, participant in participants.items():
+        output = participant.outputs.get(port.name)
+        if output is not None and not output.live:
+            return f"{output.needs} of {name}, which gives it, is 0"
+    return "no unit gives it"
 
 
 def _fed_in_part(unit: str, port: Port, fed: Set[tuple[str, str]]) -> bool:

@@ -3,7 +3,9 @@
     ∂s_a/∂t = ε(Φ)(k(Φ − Φ_r) − s_a),   ε = ε₀ + (ε₁ − ε₀) exp(−exp(−ζ(Φ − Φ_t)))
 
 Input: the transmembrane potential, held over a step or ramped; optionally the stretch. Output: s_a in kPa. Source:
-model.md, Active stress; Göktepe & Kuhl 2010, eq. 46. The step is exact for a held potential, of any length.
+model.md, Active stress; Göktepe & Kuhl 2010, eq. 46. The step is exact for a held potential, of any length; with
+`time_integration: forward_euler` it is s_a + H ε (k(Φ − Φ_r) − s_a) at the potential of its end, which oscillates with
+growing amplitude where ε₁ H > 2 and is there to show that limit.
 
 Ramped, the potential jumps from its value in the last step to that of this one at a moment evenly distributed over the
 step: its mean is the line between the two, and the mean active stress is known in closed form, of second order. The
@@ -11,7 +13,8 @@ line itself, followed by every node, would be as good for a slow potential and w
 one millisecond, of which the delay's threshold is reached somewhere in the step, and not always near its end.
 
 With `length_dependence` η the output is s_a (1 + η(λ − 1)), λ averaged from the elements around a node by volume
-(Frank–Starling). Active stress and mechanics then form an algebraic loop.
+(Frank–Starling). Active stress and mechanics then form an algebraic loop. What a mechanics needs to be stable in it is
+given too: the active stiffness K_a = ∂s_a/∂λ = s_a η, and the stretch at which both hold (Regazzoni & Quarteroni 2021).
 
 How it fails: the delay function as the seed prints it, ε₀ + (ε₀ − ε₁) exp(…), is negative in depolarised tissue, and
 the active stress runs away from its target instead of to it. A relaxation rate that is not positive ends the step.
@@ -20,12 +23,12 @@ the active stress runs away from its target instead of to it. A relaxation rate 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
 from scipy.special import exprel
 
-from .arrays import FloatArray
+from .arrays import FloatArray, frozen
 from .errors import StepFailure
 from .input_ramp import InputRamp
+from .mesh.averages import around_nodes
 from .snapshot import State
 from .unit import Unit
 from .variable import VOLTAGE, Causality, Location, Record, Variable, parameter
@@ -55,6 +58,13 @@ class Tension:
         choices=("gompertz", "seed"),
     )
     length_dependence: float = parameter(0.0, "1", "eta, relative active stress per stretch (Frank-Starling)")
+    time_integration: str = parameter(
+        "exact",
+        "1",
+        "exact: the delay's solution for a held potential, of any step; forward_euler: explicit, unstable where eps_1 "
+        "times the step exceeds 2",
+        choices=("exact", "forward_euler"),
+    )
 
     def rate(self, potential: FloatArray) -> FloatArray:
         """ε in 1/ms at the potentials (mV)."""
@@ -96,30 +106,50 @@ class ActiveStress(Unit):
             pointwise=True,
             mean_record=Record.VALUE,
         ),
+        Variable(
+            "active_stiffness",
+            Causality.OUTPUT,
+            "kPa",
+            "derivative of the active stress by the stretch",
+            Location.NODE,
+            depends_on=("potential",),
+            pointwise=True,
+            needs="length_dependence",
+        ),
+        Variable(
+            "reference_stretch",
+            Causality.OUTPUT,
+            "1",
+            "stretch at which active stress and active stiffness hold; 0 without length dependence",
+            Location.ELEMENT,
+            depends_on=("stretch",),
+            pointwise=True,
+            needs="length_dependence",
+        ),
     )
 
     def prepare(self) -> None:
         """Set up the average of the stretch around a node, where it is needed."""
         self._tension = self.parameters(Tension)
         if self._tension.length_dependence:
-            nodes = self.mesh.cells.ravel()
-            elements = np.repeat(np.arange(self.mesh.elements), self.mesh.cells.shape[1])
-            weights = coo_matrix((self.mesh.volumes[elements], (nodes, elements))).tocsr()
-            self._average = weights.multiply(1.0 / weights.sum(axis=1)).tocsr()
+            self._average = around_nodes(self.mesh.cells, self.mesh.volumes)
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """No active stress, whatever the potential."""
-        return {"tension": np.zeros(self.mesh.nodes), "active_stress": np.zeros(self.mesh.nodes)}
+        nothing = np.zeros(self.mesh.nodes)
+        return {"tension": nothing, "active_stress": nothing, **self._reference(inputs)}
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
         """The exact solution for a held potential, or its mean over the moments at which the potential may change.
 
-        StepFailure where the delay's rate is not positive.
+        With forward Euler it is one explicit step. StepFailure where the delay's rate is not positive.
         """
         first, last, tension = begin["potential"], inputs["potential"], state["tension"]
         decay = self._rate(last) * step
         target = self._tension.target(last)
-        if np.array_equal(first, last):
+        if self._tension.time_integration == "forward_euler":
+            tension = tension + decay * (target - tension)
+        elif np.array_equal(first, last):
             tension = tension - (target - tension) * np.expm1(-decay)
         else:
             earlier_decay, earlier_target = self._rate(first) * step, self._tension.target(first)
@@ -135,11 +165,18 @@ class ActiveStress(Unit):
             raise StepFailure(
                 f"the active stress at node {node} is {active_stress[node]:.3g} kPa, which no tissue bears"
             )
-        return {"tension": tension, "active_stress": active_stress}
+        return {"tension": tension, "active_stress": active_stress, **self._reference(inputs)}
 
     def output(self, name: str, state: State) -> FloatArray:
-        """Active stress in kPa, shape (nodes,)."""
+        """Active stress and its stiffness in kPa, shape (nodes,), and the stretch they hold at, shape (elements,)."""
+        if name == "active_stiffness":
+            return frozen(_KPA_PER_MPA * self._tension.length_dependence * state["tension"])
+        if name == "reference_stretch" and not self._tension.length_dependence:
+            return frozen(np.zeros(self.mesh.elements))
         return state[name]
+
+    def _reference(self, inputs: State) -> dict[str, FloatArray]:
+        return {"reference_stretch": inputs["stretch"]} if self._tension.length_dependence else {}
 
     def _rate(self, potential: FloatArray) -> FloatArray:
         rate = self._tension.rate(potential)

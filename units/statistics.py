@@ -56,6 +56,7 @@ def _statistic(field: Variable, kind: Kind) -> Statistic:
         unit=field.unit,
         description=f"{'mean' if kind is Kind.MEAN else 'maximum'} of {what} over the {field.location.value}s{missing}",
         depends_on=field.depends_on,
+        needs=field.needs,
         record=field.mean_record if kind is Kind.MEAN else Record.NOTHING,
         source=field,
         kind=kind,

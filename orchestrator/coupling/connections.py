@@ -85,7 +85,7 @@ class Connection:
 def connect(
     participants: Mapping[str, Participant], written: Sequence[str | ConnectionEntry], by_name: bool = True
 ) -> tuple[Connection, ...]:
-    """The connections as written, and, if `by_name`, for every other live input the one output of its name.
+    """The connections as written, and, if `by_name`, for every other live input the one live output of its name.
 
     An input that nothing feeds keeps its start value, and so does an element of an array.
 
@@ -114,7 +114,11 @@ def connect(
             target = End(unit, port.name)
             if not port.live or target in fed | parts:
                 continue
-            sources = [End(name, port.name) for name, other in participants.items() if port.name in other.outputs]
+            sources = [
+                End(name, port.name)
+                for name, other in participants.items()
+                if port.name in other.outputs and other.outputs[port.name].live
+            ]
             if len(sources) > 1:
                 choice = " or ".join(f"'{Connection(source, target)}'" for source in sources)
                 raise InputError(f"connections: several outputs are named {port.name}; write {choice}")

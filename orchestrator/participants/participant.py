@@ -30,8 +30,8 @@ class Port:
 
     `unit` is the unit of measure, None where an FMU declares none. `location` is `node`, `element` or `global`, None
     where unknown. A `fixed` port is exchanged once, at initialisation. A port that is not `live` has no influence with
-    the parameters given, because the one it `needs` is zero, and is not connected. `record` says what a time series
-    keeps: `value`, `probes`. A number that is drawn from a field, such as its mean, is `of` that output.
+    the parameters given, because the one it `needs` is zero, and is not connected by its name. `record` says what a
+    time series keeps: `value`, `probes`. A number that is drawn from a field, such as its mean, is `of` that output.
 
     `type` is that of FMI; Float64 is a Real here. A `discrete` port changes at events only: it is held between
     exchanges. An enumeration has `items`, the numbers it can be. Elements of an array are counted from `base`.

@@ -206,12 +206,12 @@ class Windows:
 
 
 def _named(participants: Mapping[str, Participant]) -> list[tuple[str, str, Port]]:
-    """Data set name, unit and port of every field on the mesh; units that share a name are told apart."""
+    """Data set name, unit and port of every live field on the mesh; units that share a name are told apart."""
     ports = [
         (unit, port)
         for unit, participant in participants.items()
         for port in participant.outputs.values()
-        if port.location in _CENTERS
+        if port.location in _CENTERS and port.live
     ]
     names = [port.column for _, port in ports]
     return [

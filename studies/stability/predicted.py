@@ -52,11 +52,11 @@ class Predictor:
     @property
     def is_costly(self) -> bool:
         """Whether an evaluation takes long."""
-        return bool(getattr(self._theory, "costly", False))
+        return self._theory.costly
 
     def applies(self, scenario: Scenario) -> bool:
         """Whether the theory says anything of such a coupling."""
-        if not getattr(self._theory, "of_exchange", True):
+        if not self._theory.of_exchange:
             return True
         return scenario.coupling.iterate is None and scenario.coupling.adaptive is None
 
@@ -92,7 +92,7 @@ class Predictor:
         ramps = scenario.coupling.interpolation == "linear"
         found: dict[str, Setting] = {}
         for name, entry in scenario.units.items():
-            if entry.every > 1 and getattr(self._theory, "of_exchange", True):
+            if entry.every > 1 and self._theory.of_exchange:
                 raise InputError(
                     f"{self._origin}: theory: '{self._theory.name}' is of units that step at every exchange, and "
                     f"`units.{name}.every` is {entry.every}; remove `every` or `theory`"

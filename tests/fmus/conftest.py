@@ -115,6 +115,7 @@ def _cases(mesh: Mesh) -> dict[str, Case]:
     ranges = {"potential": (-80.0, 20.0), "stretch": (0.95, 1.05), "active_stress": (0.0, 5.0)}
     ranges |= {"lv_pressure": (0.0, 2.0), "rv_pressure": (0.0, 0.5)}
     ranges |= dict.fromkeys(("F_in", "x_in", "v_in", "u"), (-1.0, 1.0))
+    ranges |= {"active_stiffness": (0.0, 50.0), "reference_stretch": (0.95, 1.05)}
     cases = {}
     for name, kind in UNITS.items():
         taken = kind.inputs()

@@ -209,15 +209,20 @@ def test_active_stress_depends_on_its_own_place(tiny: Mesh, fmus: dict) -> None:
     unknowns = root.findall("ModelStructure/Outputs/Unknown")
     scalars = [unknown for unknown in unknowns if "[" not in names[int(unknown.get("index")) - 1]]
     # Its mean and maximum are of all places, and so follow all inputs: no attribute.
-    assert [names[int(unknown.get("index")) - 1] for unknown in scalars] == ["active_stress_mean", "active_stress_max"]
-    assert all("dependencies" not in unknown.attrib for unknown in scalars)
+    follow_all = [names[int(unknown.get("index")) - 1] for unknown in scalars if "dependencies" not in unknown.attrib]
+    assert follow_all == ["active_stress_mean", "active_stress_max"]
+    seen = set()
     for unknown in (each for each in unknowns if each not in scalars):
-        node = int(re.fullmatch(r"active_stress\[(\d+)\]", names[int(unknown.get("index")) - 1])[1])
-        around = np.flatnonzero((tiny.cells == node - 1).any(axis=1)) + 1
-        assert [names[int(index) - 1] for index in unknown.get("dependencies").split()] == [
-            f"potential[{node}]",
-            *(f"stretch[{element}]" for element in around),
-        ]
+        name, place = re.fullmatch(r"(\w+)\[(\d+)\]", names[int(unknown.get("index")) - 1]).groups()
+        around = np.flatnonzero((tiny.cells == int(place) - 1).any(axis=1)) + 1
+        stretches = [f"stretch[{element}]" for element in around]
+        assert [names[int(index) - 1] for index in unknown.get("dependencies").split()] == {
+            "active_stress": [f"potential[{place}]", *stretches],
+            "active_stiffness": [f"potential[{place}]"],
+            "reference_stretch": [f"stretch[{place}]"],
+        }[name]
+        seen.add(name)
+    assert len(seen) == 3
 
 
 @pytest.mark.parametrize("coupled", ["electrophysiology", "mechanics"])

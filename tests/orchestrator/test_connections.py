@@ -38,7 +38,13 @@ def test_the_units_of_the_heart_find_each_other_by_name(small_heart: Mesh) -> No
     }
     # With length dependence the active stress follows the stretch too, and an algebraic loop comes into being.
     heart["active_stress"] = NativeParticipant("active_stress", "active_stress", small_heart, {"length_dependence": 1})
-    assert "mechanics.stretch -> active_stress.stretch" in _texts(connect(heart, []))
+    looped = _texts(connect(heart, []))
+    assert "mechanics.stretch -> active_stress.stretch" in looped
+    # And the mechanics is told of it, if it wants to know.
+    stabilising = {f"active_stress.{name} -> mechanics.{name}" for name in ("active_stiffness", "reference_stretch")}
+    assert stabilising < looped
+    heart["mechanics"] = NativeParticipant("mechanics", "mechanics", small_heart, {"stabilization": 0})
+    assert _texts(connect(heart, [])) == looped - stabilising
 
 
 def test_a_written_connection_goes_before_the_one_by_name(fake, port) -> None:
@@ -69,6 +75,15 @@ def test_an_input_that_does_not_matter_is_left_alone_unless_written(fake, port) 
     units = {"a": fake("a", outputs=[port("x")]), "b": fake("b", [port("x", live=False)])}
     assert connect(units, []) == ()
     assert _texts(connect(units, ["a.x -> b.x"])) == {"a.x -> b.x"}
+
+
+def test_an_output_that_says_nothing_feeds_nobody_unless_written(fake, port) -> None:
+    units = {"a": fake("a", outputs=[port("x", live=False)]), "b": fake("b", [port("x")])}
+    assert connect(units, []) == ()
+    assert _texts(connect(units, ["a.x -> b.x"])) == {"a.x -> b.x"}
+    # Nor does it compete with one that does.
+    units["c"] = fake("c", outputs=[port("x")])
+    assert _texts(connect(units, [])) == {"c.x -> b.x"}
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,25 @@ def test_what_is_not_modelled_is_named_with_the_reason_and_what_it_saves(small_s
     assert np.count_nonzero(log["seconds_electrophysiology"]) == 10
 
 
+def test_what_stabilises_a_loop_is_exchanged_where_there_is_one(small_scenario: Path, small_heart: Mesh) -> None:
+    shown = _show(small_scenario)
+    missing = "mechanics.{}: length_dependence of active_stress, which gives it, is 0, so it keeps its start value"
+    for name in ("active_stiffness", "reference_stretch"):
+        assert missing.format(name) in shown["not modelled"]
+    looped = _show(small_scenario, "units.active_stress.parameters.length_dependence=2")
+    assert "active_stress.active_stiffness -> mechanics.active_stiffness" in looped["connections"]
+    # Beside potential, active stress and the stretch, which two units want.
+    numbers = 3 * small_heart.nodes + 3 * small_heart.elements
+    assert looped["exchange"][0] == f"{numbers} numbers in 6 fields at every exchange"
+    plain = _show(
+        small_scenario,
+        "units.active_stress.parameters.length_dependence=2",
+        "units.mechanics.parameters.stabilization=0",
+    )
+    assert "mechanics.active_stiffness: stabilization of the unit is 0" in " ".join(plain["not modelled"])
+    assert plain["exchange"][0].endswith("in 4 fields at every exchange")
+
+
 def test_an_input_that_nobody_feeds_is_named(small_scenario: Path, tmp_path: Path) -> None:
     text = small_scenario.read_text().replace("  mechanics: {unit: mechanics}\n", "")
     (tmp_path / "small2.yaml").write_text(text)

@@ -214,3 +214,72 @@ def test_length_dependence_that_would_push_is_refused(cube, started) -> None:
     unit.set("stretch", np.full(cube.elements, 0.79))
     with pytest.raises(StepFailure, match="length_dependence 5 turns it negative"):
         unit.do_step(0.001, 0.001)
+
+
+# --- what stabilises a loop ----------------------------------------------------------------------------------------
+
+
+def test_active_stiffness_is_the_derivative_by_the_stretch(cube, started) -> None:
+    eta, change = 2.0, 1e-4
+    potential = np.linspace(_REST, 20.0, cube.nodes)
+    found = []
+    for stretch in (0.95 - change, 0.95, 0.95 + change):
+        unit = started(ActiveStress, cube, {"length_dependence": eta}, potential=potential)
+        unit.set("stretch", np.full(cube.elements, stretch))
+        unit.do_step(0.0, 0.003)
+        found.append(unit)
+    low, middle, high = found
+    slope = (high.get("active_stress") - low.get("active_stress")) / (2.0 * change)
+    assert slope.max() > 500.0
+    np.testing.assert_allclose(middle.get("active_stiffness"), slope, rtol=1e-9, atol=1e-9)
+
+
+def test_reference_stretch_is_the_one_that_was_seen_whatever_is_set_since(cube, started) -> None:
+    unit = started(ActiveStress, cube, {"length_dependence": 2.0})
+    seen = 1.0 + np.random.default_rng(6).uniform(-0.1, 0.1, cube.elements)
+    unit.set("stretch", seen)
+    unit.do_step(0.0, 0.001)
+    unit.set("stretch", np.full(cube.elements, 0.8))
+    np.testing.assert_array_equal(unit.get("reference_stretch"), seen)
+    unit.do_step(0.001, 0.001)
+    np.testing.assert_array_equal(unit.get("reference_stretch"), 0.8)
+
+
+def test_without_length_dependence_there_is_neither_stiffness_nor_reference(cube, started) -> None:
+    unit = started(ActiveStress, cube, potential=np.full(cube.nodes, 20.0))
+    unit.do_step(0.0, 0.01)
+    assert not unit.get("active_stiffness").any()
+    assert not unit.get("reference_stretch").any()
+    assert "reference_stretch" not in unit.get_state().state
+
+
+# --- forward Euler -------------------------------------------------------------------------------------------------
+
+
+def _relaxed(cube, started, step_ms: float, steps: int, **parameters) -> np.ndarray:
+    """Distance from the target of 500 kPa after each step, relative to that at first; fast rate 1/ms."""
+    unit = started(ActiveStress, cube, parameters, potential=np.full(cube.nodes, 20.0))
+    course = []
+    for number in range(steps):
+        unit.do_step(1e-3 * step_ms * number, 1e-3 * step_ms)
+        course.append(1.0 - unit.get("active_stress")[0] / 500.0)
+    return np.array(course)
+
+
+@pytest.mark.parametrize("step_ms", [0.5, 1.99, 2.01, 2.2])
+def test_forward_euler_is_stable_below_two_time_constants_and_not_above(step_ms: float, cube, started) -> None:
+    course = _relaxed(cube, started, step_ms, 20, time_integration="forward_euler")
+    np.testing.assert_allclose(course[1:] / course[:-1], 1.0 - step_ms, rtol=1e-6)
+    assert (abs(course[-1]) < 1.0) == (step_ms < 2.0)
+    # The solution by which the unit steps otherwise knows no limit.
+    exact = _relaxed(cube, started, step_ms, 20)
+    np.testing.assert_allclose(exact, np.exp(-step_ms * np.arange(1, 21)), rtol=1e-6, atol=1e-12)
+
+
+def test_forward_euler_tends_to_the_exact_solution_at_first_order(cube, started, slopes) -> None:
+    steps = np.array([0.4, 0.2, 0.1, 0.05])
+    errors = [
+        abs(_relaxed(cube, started, step, round(2.0 / step), time_integration="forward_euler")[-1] - np.exp(-2.0))
+        for step in steps
+    ]
+    assert slopes(steps, errors)[-1] == pytest.approx(1.0, abs=0.1)

@@ -41,6 +41,12 @@ def _wave(mesh: Mesh, number: int, nodes: bool) -> np.ndarray:
     return 0.5 + 0.5 * np.sin(0.2 * places[:, 0] + 0.3 * places[:, 2] + number)
 
 
+#: How an active stress depends on the stretch; in some elements the mechanics takes the stretch that it has itself.
+_STIFFNESS = {
+    "active_stiffness": lambda mesh, number: 300.0 * _wave(mesh, number, nodes=True),
+    "reference_stretch": lambda mesh, number: np.where(_wave(mesh, number, nodes=False) > 0.5, 0.95, 0.0),
+}
+
 _SCENES = [
     _Scene(FiberGenerator, ("endocardial_angle_deg", 50.0)),
     _Scene(
@@ -63,14 +69,14 @@ _SCENES = [
     _Scene(
         Mechanics,
         ("shear_modulus_MPa", 0.3),
-        moving={"active_stress": lambda mesh, number: 200.0 * _wave(mesh, number, nodes=True)},
+        moving={"active_stress": lambda mesh, number: 200.0 * _wave(mesh, number, nodes=True), **_STIFFNESS},
         failing={"active_stress": lambda mesh: np.full(mesh.nodes, -5000.0)},
     ),
     _Scene(
         LocalMechanics,
         ("shear_modulus_MPa", 0.3),
         # Where it is negative the fibre is in tension, and its stiffness counts.
-        moving={"active_stress": lambda mesh, number: 200.0 * _wave(mesh, number, nodes=True) - 40.0},
+        moving={"active_stress": lambda mesh, number: 200.0 * _wave(mesh, number, nodes=True) - 40.0, **_STIFFNESS},
         failing={"active_stress": lambda mesh: np.full(mesh.nodes, -5000.0)},
     ),
     _Scene(

@@ -1,6 +1,6 @@
 """The local mechanics unit: every element in equilibrium by itself, without a mesh between them.
 
-    2∂W/∂C + s_a (a₀⊗a₀ + 0.4 s₀⊗s₀ + 0.4 n₀⊗n₀) = 0 in the axes of fibre, sheet and normal
+    2∂W/∂C + s_a (a₀⊗a₀ + 0.4 s₀⊗s₀ + 0.4 n₀⊗n₀) = 0 in the axes of fibre, sheet and normal (`local_equilibrium`)
 
 The same strain energy and variables as finite-element mechanics (`unit`), in every dimension. `free`: each element
 contracts as a cube that nothing holds; `isometric`: its fibre keeps its length and the two other directions are free.
@@ -10,6 +10,7 @@ How it fails: where no equilibrium is found, not even in many small steps of act
 StepFailure.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,21 +20,21 @@ from ..errors import StepFailure
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import parameter
-from .kinematics import Kinematics
 from .laws.registry import LAWS, Material
+from .loads.active_stiffness import Stabilization, StretchDependence
 from .loads.active_stress import ActiveShares
+from .local_equilibrium import LocalEquilibrium
+from .local_tension import LocalTension
 from .unit import Mechanics
 
 _MPA_PER_KPA = 1e-3
 
-#: Residual stress relative to the shear modulus, Newton iterations, and load steps at the most.
-_TOLERANCE = 1e-12
-_ITERATIONS = 30
+#: Load steps at the most.
 _MOST_LOAD_STEPS = 64
 
-
-#: What the outputs follow; the others are zero.
-_FOLLOWS = {"stretch": ("active_stress",)}
+#: What the outputs follow; the others are zero. An element's stretch follows only what is around it; but to write all
+#: of that into an FMU would take a hundred times what else is in it, and it may say that an output follows everything.
+_FOLLOWS = {"stretch": Mechanics.variable("stretch").depends_on}
 
 
 @dataclass(frozen=True)
@@ -53,44 +54,50 @@ class LocalMechanics(Unit):
 
     name = "local_mechanics"
     memoryless = True
-    groups = (Material, *LAWS, ActiveShares, Hold)
+    groups = (Material, *LAWS, ActiveShares, Stabilization, Hold)
     fields = tuple(replace(variable, depends_on=_FOLLOWS.get(variable.name, ())) for variable in Mechanics.fields)
 
     def prepare(self) -> None:
-        """The axes of the material are those of fibre, sheet and normal: their directions in space do not matter."""
-        self._laws = [self.parameters(law) for law in self.parameters(Material).laws]
-        self._modulus = max(law.modulus for law in self._laws)
+        """Set the equilibrium up."""
         shares = self.parameters(ActiveShares)
-        self._shares = np.array([1.0, shares.active_share_sheet, shares.active_share_normal])
-        self._structure = np.zeros((self.mesh.elements, 3, 3))
-        self._structure[:, 0, 0] = 1.0
-        self._sheet_structure = np.zeros_like(self._structure)
-        self._sheet_structure[:, 1, 1] = 1.0
-        self._free = slice(1 if self.parameters(Hold).hold == "isometric" else 0, 3)
+        self._equilibrium = LocalEquilibrium(
+            self.mesh.elements,
+            [self.parameters(law) for law in self.parameters(Material).laws],
+            np.array([1.0, shares.active_share_sheet, shares.active_share_normal]),
+            self.parameters(Hold).hold == "isometric",
+        )
+        self._tension = LocalTension(self._equilibrium, self.mesh)
+        self._stabilization = self.parameters(Stabilization).stabilization
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """The undeformed state, brought to equilibrium with the initial active stress."""
-        undeformed = {"squares": np.ones((self.mesh.elements, 3)), "tension": np.zeros(self.mesh.elements)}
+        elements = self.mesh.elements
+        undeformed = {
+            "squares": np.ones((elements, 3)),
+            "tension": np.zeros(elements),
+            "reference": np.ones(elements),
+        }
         return self.advance(undeformed, inputs, inputs, 0.0, 0.0)
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
         """Equilibrium under the active stress at the end of the step, found from the last one."""
-        tension = _MPA_PER_KPA * inputs["active_stress"][self.mesh.cells].mean(axis=1)
+        before = state["tension"]
+        stress, dependence = _MPA_PER_KPA * inputs["active_stress"], self._dependence(state, inputs, step)
         load_steps = 1
         while load_steps <= _MOST_LOAD_STEPS:
-            squares = np.array(state["squares"])
+            squares, tension = np.array(state["squares"]), before
             for number in range(1, load_steps + 1):
-                share = number / load_steps
-                found = self._newton(squares, (1.0 - share) * state["tension"] + share * tension)
+                found = self._tension.squares(squares, before, number / load_steps, stress, dependence)
                 if found is None:
                     break
-                squares = found
+                squares, tension = found
             else:
-                return {"squares": squares, "tension": tension}
+                return {"squares": squares, "tension": tension, "reference": dependence.reference}
             load_steps *= 4
+        change = self._tension.in_elements(stress) - before
         raise StepFailure(
             f"no equilibrium found, not even in {_MOST_LOAD_STEPS} load steps; the active stress changes by up to "
-            f"{np.abs(tension - state['tension']).max():.3g} MPa: take shorter communication steps"
+            f"{np.abs(change).max():.3g} MPa: take shorter communication steps"
         )
 
     def output(self, name: str, state: State) -> FloatArray:
@@ -99,34 +106,19 @@ class LocalMechanics(Unit):
             return frozen(np.sqrt(state["squares"][:, 0]))
         return frozen(np.zeros(self.variable(name).shape(self.mesh)))
 
-    def _newton(self, squares: FloatArray, tension: FloatArray) -> FloatArray | None:
-        """The squared stretches along fibre, sheet and normal, shape (elements, 3); None without convergence."""
-        free, modulus = self._free, self._modulus
-        squares = squares.copy()
-        for _ in range(_ITERATIONS):
-            at = self._at(squares)
-            with np.errstate(over="ignore", invalid="ignore"):
-                stress = sum(law.stress(at) for law in self._laws)
-                residual = np.einsum("eii->ei", stress) + tension[:, None] * self._shares
-                if np.abs(residual[:, free]).max() <= _TOLERANCE * modulus:
-                    return squares
-                tangent = 0.5 * np.asarray(sum(law.tangent(at)[:, free, free] for law in self._laws))
-            # Normal components of the tangent: stress by half the change of the squared stretches.
-            # Where the tissue is torn apart its energy overflows, or has no curvature left.
-            if not (np.isfinite(tangent).all() and np.isfinite(residual).all()):
-                return None
-            try:
-                change = -np.linalg.solve(tangent, residual[:, free, None])[:, :, 0]
-            except np.linalg.LinAlgError:
-                return None
-            # No square may lose more than half of itself: it stays positive.
-            shrunk = np.max(-change / (0.5 * squares[:, free]), axis=1, initial=1.0)
-            squares[:, free] += change / shrunk[:, None]
-        return None
+    def stretch_response(self) -> Callable[[FloatArray], FloatArray]:
+        """How the stretch answers a small change of the active stress at present, its own stiffness left out.
 
-    def _at(self, squares: FloatArray) -> Kinematics:
-        diagonal = np.zeros((len(squares), 3, 3))
-        inverse = np.zeros((len(squares), 3, 3))
-        np.einsum("eii->ei", diagonal)[:] = squares
-        np.einsum("eii->ei", inverse)[:] = 1.0 / squares
-        return Kinematics(diagonal, inverse, 0.5 * np.log(squares).sum(axis=1), self._structure, self._sheet_structure)
+        From changes of the active stress at the nodes in MPa, shape (nodes,), to changes of the stretch, (elements,).
+        """
+        slope = self._equilibrium.stretch_by_tension(self.get_state().state["squares"])
+        return lambda change: slope * self._tension.in_elements(change)
+
+    def _dependence(self, state: State, inputs: State, step: float) -> StretchDependence:
+        stiffness = self._stabilization * _MPA_PER_KPA * inputs["active_stiffness"]
+        reference = state["reference"]
+        if stiffness.any():
+            # A step of no length begins where the last one began.
+            own = np.sqrt(state["squares"][:, 0]) if step else reference
+            reference = np.where(inputs["reference_stretch"], inputs["reference_stretch"], own)
+        return StretchDependence(stiffness, reference)

@@ -1,10 +1,12 @@
 """The discretised solid: energy, out-of-balance forces and stiffness of tissue under its loads.
 
 A solid is put together of parts that know nothing of each other: elements (`elements`), passive laws (`laws`), active
-stress and surface loads (`loads`). All have a potential, so that an equilibrium is the minimum of an energy.
+stress and surface loads (`loads`). All but the active
+stiffness have a potential, so that an equilibrium is the minimum of an energy.
 
 What changes from step to step is the vector of loads: the active stress at the mesh's nodes, then a size for every
-variable surface load, all in MPa.
+variable surface load, all in MPa. The vector may go on with the active stiffness at the nodes in MPa and the stretch of
+each element at which the active stress holds (`loads/active_stiffness`).
 """
 
 from collections.abc import Sequence
@@ -17,6 +19,7 @@ from .bulk import NumpyBulk, Tissue
 from .compiled_bulk import bulk
 from .elements.space import Space
 from .kinematics import Kinematics, determinant, square
+from .loads.active_stiffness import ActiveStiffness, StretchDependence
 from .loads.surface_load import SurfaceLoad
 from .stiffness import Stiffness, StiffnessPattern
 
@@ -54,13 +57,32 @@ class Solid:
         self._places = np.flatnonzero(free)
         self._vertices = int(space.nodes[:, :4].max()) + 1
         self.unknowns = len(self._places)
-        #: How many loads there are: shape (loads,).
+        #: How many loads there are, active stiffness and the stretch of elements apart: shape (loads,).
         self.loads = self._vertices + len(pressures)
 
     @property
     def compiled(self) -> bool:
         """Whether compiled kernels compute it, and not NumPy."""
         return not isinstance(self._bulk, NumpyBulk)
+
+    @cached_property
+    def active_stiffness(self) -> ActiveStiffness:
+        """The active stress by its dependence on the stretch."""
+        return ActiveStiffness(self.space, self._tissue.fiber)
+
+    def is_symmetric(self, loads: FloatArray) -> bool:
+        """Whether the tangent is the residual's whole derivative, and the energy its potential: no active stiffness."""
+        return self._dependence(loads) is None
+
+    def active_forces(self, displacement: FloatArray, tension: FloatArray) -> FloatArray:
+        """Forces in N of an active stress `tension` in MPa, shape (vertices,), at the free degrees of freedom.
+
+        ValueError where an element is inverted.
+        """
+        found = [self._bulk.forces(displacement, stress, False) for stress in (tension, 0.0 * tension)]
+        if found[0] is None or found[1] is None:
+            raise ValueError("an element is inverted")
+        return (found[0][1] - found[1][1]).reshape(-1)[self._places]
 
     def moved(self, displacement: FloatArray, step: FloatArray) -> FloatArray:
         """A new displacement, shape (nodes, 3): the free degrees of freedom moved by `step`, shape (unknowns,)."""
@@ -84,25 +106,35 @@ class Solid:
         return float(np.abs(sum(law.stress(at) for law in self._tissue.laws)).max())
 
     def energy(self, displacement: FloatArray, loads: FloatArray) -> float:
-        """Total potential energy in N mm; infinite where an element is inverted."""
+        """Total potential energy in N mm, where there is one; infinite where an element is inverted."""
         return self.energy_and_residual(displacement, loads)[0]
 
     def residual(self, displacement: FloatArray, loads: FloatArray) -> FloatArray | None:
         """Out-of-balance force in N at the free degrees of freedom; None where an element is inverted."""
-        found = self._bulk.forces(displacement, loads[: self._vertices], False)
+        found = self._bulk.forces(displacement, self._tension(displacement, loads), False)
         return None if found is None else self._reduced(found[1], displacement, loads)
 
     def energy_and_residual(self, displacement: FloatArray, loads: FloatArray) -> tuple[float, FloatArray]:
-        """Both at once; they share the kinematics. Infinite and NaN where an element is inverted."""
-        found = self._bulk.forces(displacement, loads[: self._vertices], True)
+        """Both at once; they share the kinematics. Infinite and NaN where an element is inverted.
+
+        Where the loads are not symmetric (`is_symmetric`) there is no energy, and the number says no more than whether
+        an element is inverted.
+        """
+        found = self._bulk.forces(displacement, self._tension(displacement, loads), True)
         if found is None:
             return np.inf, np.full(self.unknowns, np.nan)
         energy = found[0] + sum(size * load.energy(displacement) for size, load in self._on_surfaces(loads))
         return energy, self._reduced(found[1], displacement, loads)
 
     def tangent(self, displacement: FloatArray, loads: FloatArray) -> Stiffness:
-        """Derivative of the residual by the free degrees of freedom, in N/mm. Needs det F > 0."""
-        blocks = self._bulk.stiffness(displacement, loads[: self._vertices])
+        """Derivative of the residual by the free degrees of freedom, in N/mm. Needs det F > 0.
+
+        Of the active stiffness the part that is symmetric (`loads/active_stiffness`).
+        """
+        blocks = self._bulk.stiffness(displacement, self._tension(displacement, loads))
+        dependence = self._dependence(loads)
+        if dependence is not None:
+            self._pattern.add(blocks, self._pattern.slots, self.active_stiffness.stiffness(displacement, dependence))
         for size, load in self._on_surfaces(loads):
             self._pattern.add(blocks, self._slots_of(load), size * load.stiffness(displacement))
         return Stiffness(self._pattern, blocks)
@@ -114,8 +146,20 @@ class Solid:
 
     def _on_surfaces(self, loads: FloatArray) -> list[tuple[float, SurfaceLoad]]:
         """Surface loads that are there, with their sizes; one of size 0 costs nothing."""
-        sized = zip(loads[self._vertices :].tolist(), self._pressures, strict=True)
+        sized = zip(loads[self._vertices : self.loads].tolist(), self._pressures, strict=True)
         return [*self._supports, *((size, load) for size, load in sized if size)]
+
+    def _tension(self, displacement: FloatArray, loads: FloatArray) -> FloatArray:
+        """The active stress at the vertices, with what it gains by the stretch, shape (vertices,)."""
+        tension, dependence = loads[: self._vertices], self._dependence(loads)
+        if dependence is None:
+            return tension
+        return tension + self.active_stiffness.stress(self.stretch(displacement), dependence)
+
+    def _dependence(self, loads: FloatArray) -> StretchDependence | None:
+        """How the active stress depends on the stretch; None where it does not."""
+        stiffness = loads[self.loads : self.loads + self._vertices]
+        return StretchDependence(stiffness, loads[self.loads + self._vertices :]) if stiffness.any() else None
 
     def _slots_of(self, load: SurfaceLoad) -> IntArray:
         if id(load) not in self._load_slots:

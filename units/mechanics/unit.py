@@ -2,8 +2,9 @@
 
     W = ½μ(I₁ − 3) − μ ln J + ½λ_L(ln J)² + W_f,   S = 2∂W/∂C + s_a (a₀⊗a₀ + 0.4 s₀⊗s₀ + 0.4 n₀⊗n₀)
 
-Displacement fixed on `base`, no inertia. Inputs: the active stress at the nodes, the pressures in the cavities, and
-once fibre and sheet. Outputs: stretch per element, displacement, the volumes of the cavities, and the apex's uplift.
+Displacement fixed on `base`, no inertia. Inputs: the active stress at the nodes, where it depends on the stretch its
+stiffness and the stretch it holds at (`loads/active_stiffness`), the pressures in the cavities, and once fibre and
+sheet. Outputs: stretch per element, displacement, the volumes of the cavities, and the apex's uplift.
 Other passive laws are chosen by `material`, quadratic displacements by `element_order`. Source: model.md, Mechanics.
 
 Loose tolerances are dangerous here: resting tissue fires by itself where λ − 1 > 3.3e-5.
@@ -31,6 +32,7 @@ from .bulk import Tissue
 from .elements.registry import Elements
 from .laws.neo_hooke import NeoHooke
 from .laws.registry import LAWS, Material
+from .loads.active_stiffness import Stabilization
 from .loads.active_stress import ActiveShares
 from .loads.cavity_pressure import CavityPressure
 from .loads.registry import SUPPORTS
@@ -39,6 +41,7 @@ from .solvers.choice import LinearSolver
 from .solvers.equilibrium import Convergence, Equilibrium
 from .solvers.factored import Factored
 from .solvers.predictor import MEMORY, Predictor
+from .stretch_response import StretchResponse
 
 _MPA_PER_KPA = 1e-3
 _ML_PER_MM3 = 1e-3
@@ -49,7 +52,14 @@ _STRESS_FREE = 1e-9
 #: The cavities' volumes and the pressures in them.
 _PRESSURES = {"lv_volume": "lv_pressure", "rv_volume": "rv_pressure"}
 
-_FOLLOWS_ALL = ("active_stress", *_PRESSURES.values(), "fiber", "sheet")
+_FOLLOWS_ALL = (
+    "active_stress",
+    "active_stiffness",
+    "reference_stretch",
+    *_PRESSURES.values(),
+    "fiber",
+    "sheet",
+)
 
 
 class Mechanics(Unit):
@@ -57,9 +67,25 @@ class Mechanics(Unit):
 
     name = "mechanics"
     memoryless = True
-    groups = (Material, *LAWS, ActiveShares, *SUPPORTS, Elements, Convergence, LinearSolver)
+    groups = (Material, *LAWS, ActiveShares, Stabilization, *SUPPORTS, Elements, Convergence, LinearSolver)
     fields = (
         Variable("active_stress", Causality.INPUT, "kPa", "active stress along the fibre", Location.NODE),
+        Variable(
+            "active_stiffness",
+            Causality.INPUT,
+            "kPa",
+            "derivative of the active stress by the stretch",
+            Location.NODE,
+            needs="stabilization",
+        ),
+        Variable(
+            "reference_stretch",
+            Causality.INPUT,
+            "1",
+            "stretch at which active stress and active stiffness hold; 0: the unit's own at the begin of the step",
+            Location.ELEMENT,
+            needs="stabilization",
+        ),
         *(
             Variable(name, Causality.INPUT, "kPa", f"pressure in the {side} ventricle's cavity, if there is one")
             for name, side in (("lv_pressure", "left"), ("rv_pressure", "right"))
@@ -134,6 +160,7 @@ class Mechanics(Unit):
             self._solid, self._modulus * element_size**2, self.parameters(Convergence), self._factorisation
         )
         self._predictor = Predictor(self._solid.loads, mesh.nodes, float(np.sqrt(mesh.nodes)))
+        self._stabilization = self.parameters(Stabilization).stabilization
         self._apex = int(mesh.points[:, 2].argmin())
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
@@ -150,7 +177,8 @@ class Mechanics(Unit):
                 )
             )
         rest = frozen(np.zeros((len(self._solid.space.points), 3)))
-        unloaded = frozen(np.zeros(self._solid.loads))
+        stresses = frozen(np.zeros(self._solid.loads))
+        unloaded = frozen(np.concatenate([stresses, np.zeros(self.mesh.nodes), np.ones(self.mesh.elements)]))
         undeformed = {
             "displacement": rest,
             "loads": unloaded,
@@ -159,13 +187,13 @@ class Mechanics(Unit):
             "factors_spent": np.zeros(()),
         }
         for load, displacement in _CHANGES:
-            undeformed |= {load: unloaded, displacement: rest}
+            undeformed |= {load: stresses, displacement: rest}
         return self.advance(undeformed, inputs, inputs, 0.0, 0.0)
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
         """Equilibrium under the loads at the end of the step; a memoryless map but for its starting guess."""
-        loads, start = self._loads(inputs), state["displacement"]
-        change = loads - state["loads"]
+        loads, start = self._loads(state, inputs, step), state["displacement"]
+        change = (loads - state["loads"])[: self._solid.loads]
         foreseen = self._predictor(
             change,
             [state[load] for load, _ in _CHANGES],
@@ -204,10 +232,22 @@ class Mechanics(Unit):
             return frozen(0.0)
         return frozen(_ML_PER_MM3 * self._cavities[name].volume(displacement))
 
-    def _loads(self, inputs: State) -> FloatArray:
-        """Active stress at the nodes, then the pressures in the cavities, in MPa, shape (loads,)."""
-        pressures = [inputs[_PRESSURES[name]] for name in self._cavities]
-        return frozen(_MPA_PER_KPA * np.concatenate([inputs["active_stress"], *(np.atleast_1d(p) for p in pressures)]))
+    def stretch_response(self) -> StretchResponse:
+        """How the stretch answers a small change of the active stress at present, its own stiffness left out."""
+        state = self.get_state().state
+        return StretchResponse(self._solid, state["displacement"], state["loads"][: self._solid.loads])
+
+    def _loads(self, state: State, inputs: State, step: float) -> FloatArray:
+        """As `Solid` has them: stresses and active stiffness in MPa, and the stretch they hold at."""
+        pressures = [np.atleast_1d(inputs[_PRESSURES[name]]) for name in self._cavities]
+        stiffness = self._stabilization * inputs["active_stiffness"]
+        stresses = _MPA_PER_KPA * np.concatenate([inputs["active_stress"], *pressures, stiffness])
+        reference = state["loads"][len(stresses) :]
+        if stiffness.any():
+            # A step of no length begins where the last one began.
+            own = self._solid.stretch(state["displacement"]) if step else reference
+            reference = np.where(inputs["reference_stretch"], inputs["reference_stretch"], own)
+        return frozen(np.concatenate([stresses, reference]))
 
 
 #: The last changes of loads and of displacement in the state, the latest first.

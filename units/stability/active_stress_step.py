@@ -8,16 +8,17 @@ so that one of the two is the worst. The seed's delay function has a negative ra
 from math import exp, inf
 from typing import ClassVar
 
-from .theory import Coupled
+from .theory import Coupled, Theory
 
 _LARGEST_EXPONENT = 700.0
 
 
-class ActiveStressStep:
+class ActiveStressStep(Theory):
     """One unit `active_stress`, whose step is the communication step."""
 
     name: ClassVar[str] = "active_stress_step"
     formula: ClassVar[str] = "|1 − ε₁ H| < 1 by forward Euler; e^(−ε₀ H) < 1 always by the exact step"
+    of_exchange: ClassVar[bool] = False
 
     def amplification(self, coupled: Coupled) -> float:
         """See Theory."""

@@ -26,18 +26,19 @@ from ..fiber_generator import FiberGenerator
 from ..mesh import Mesh
 from ..mesh.refinement import refined
 from .reaction_step import fastest_decay, substep_ms, two_stages
-from .theory import Coupled
+from .theory import Coupled, Theory
 
 #: Systems of which the eigenvalue is remembered.
 _MOST_KNOWN = 100
 
 
 @dataclass
-class ExplicitDiffusion:
+class ExplicitDiffusion(Theory):
     """One unit `electrophysiology`: its substep against the fastest mode of diffusion on its mesh."""
 
     name: ClassVar[str] = "explicit_diffusion"
     formula: ClassVar[str] = "h (λ_max + λ_cell) < 2, (K + G) v = λ M v"
+    of_exchange: ClassVar[bool] = False
     _known: dict[Hashable, float] = field(default_factory=dict)
 
     def amplification(self, coupled: Coupled) -> float:

@@ -23,10 +23,10 @@ from ..arrays import FloatArray
 from ..errors import InvalidInput
 from ..test_problems.response import Law
 from .exchange_map import LinearUnit, Seen, exchange_map, spectral_radius
-from .theory import Coupled, Setting
+from .theory import Coupled, Setting, Theory
 
 
-class Feedback:
+class Feedback(Theory):
     """Two or more units `response` in a ring."""
 
     name: ClassVar[str] = "feedback"

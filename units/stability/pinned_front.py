@@ -23,7 +23,7 @@ from ..electrophysiology.monodomain import Conduction, Monodomain
 from ..electrophysiology.time_scale import TimeScale
 from ..errors import InvalidInput
 from ..mesh import Mesh
-from .theory import Coupled
+from .theory import Coupled, Theory
 
 #: Elements of the line on which the front stands: it is flat within three of them.
 _ELEMENTS = 24
@@ -33,11 +33,12 @@ _BEGINS = (0.0, *np.geomspace(1e-4, 0.1, 16).tolist())
 _SMALLEST_STEP = 1e-5
 
 
-class PinnedFront:
+class PinnedFront(Theory):
     """On a strand without recovery: elements above this size stop the wave."""
 
     name: ClassVar[str] = "pinned_front"
     formula: ClassVar[str] = "a front passes where d β_t/(c h²) exceeds that of the last standing front"
+    of_exchange: ClassVar[bool] = False
 
     def amplification(self, coupled: Coupled) -> float:
         """h over the largest element size that a wave passes; InvalidInput unless the mesh is a strand."""

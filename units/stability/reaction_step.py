@@ -28,17 +28,18 @@ from ..electrophysiology.stimulus import Stimulus
 from ..electrophysiology.time_scale import TimeScale
 from ..electrophysiology.unit import PotentialScale, Resolution
 from ..errors import InvalidInput
-from .theory import Coupled, Setting
+from .theory import Coupled, Setting, Theory
 
 #: How long a pulse is followed, in fastest times of the model; places along it; half a difference for derivatives.
 _FOLLOWED, _PLACES, _HALF = 400.0, 2000, 1e-6
 
 
-class ReactionStep:
+class ReactionStep(Theory):
     """One unit `electrophysiology`: its substep against the fastest decay of its cells."""
 
     name: ClassVar[str] = "reaction_step"
     formula: ClassVar[str] = "h λ < 2, λ the fastest decay along the action potential, c(1 − α)/β_t"
+    of_exchange: ClassVar[bool] = False
 
     def amplification(self, coupled: Coupled) -> float:
         """See Theory."""

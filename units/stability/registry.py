@@ -3,17 +3,19 @@
 from .active_stress_step import ActiveStressStep
 from .explicit_diffusion import ExplicitDiffusion
 from .feedback import Feedback
+from .loop_gain import LoopGain
 from .pinned_front import PinnedFront
 from .reaction_step import ReactionStep
 from .theory import Theory
 from .two_masses import TwoMasses
 
 _ALL: tuple[Theory, ...] = (
+    LoopGain(),
     TwoMasses(),
     Feedback(),
     ReactionStep(),
-    ExplicitDiffusion(),
     ActiveStressStep(),
+    ExplicitDiffusion(),
     PinnedFront(),
 )
 

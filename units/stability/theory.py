@@ -67,17 +67,17 @@ class Coupled:
 
 
 class Theory(Protocol):
-    """What is predicted, and by which formula.
-
-    One whose evaluation takes a second or more says `costly = True`, and is asked less often. One that is of steps
-    inside of units, whatever the coupling, says `of_exchange = False`; all others are not asked of coupling that is
-    iterated or adaptive.
-    """
+    """What is predicted, and by which formula."""
 
     #: Its name, as a study gives it.
     name: ClassVar[str]
     #: The condition of stability, for a person: `|g| < 1, g = −K_a/K_p`.
     formula: ClassVar[str]
+    #: Whether an evaluation takes a second or more: it is asked less often then.
+    costly: ClassVar[bool] = False
+    #: Whether it is of explicit exchange: it is not asked of coupling that is iterated or adaptive then. Others are of
+    #: steps inside of units, or of their meshes, whatever the coupling.
+    of_exchange: ClassVar[bool] = True
 
     def amplification(self, coupled: Coupled) -> float:
         """The factor by which a disturbance grows from one step to the next; 1 is the limit of stability.

@@ -18,7 +18,7 @@ from ..arrays import FloatArray
 from ..errors import InvalidInput
 from ..test_problems.mass import Suspension
 from .exchange_map import LinearUnit, Seen, exchange_map, spectral_radius
-from .theory import Coupled
+from .theory import Coupled, Theory
 
 _MS_PER_S = 1000.0
 
@@ -26,7 +26,7 @@ _MS_PER_S = 1000.0
 _X, _V, _F = 0, 1, 2
 
 
-class TwoMasses:
+class TwoMasses(Theory):
     """Two units `mass`, or FMUs of the same equation that have the parameters m, k, c, k_c and c_c."""
 
     name: ClassVar[str] = "two_masses"

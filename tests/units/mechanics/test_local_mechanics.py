@@ -58,3 +58,46 @@ def test_finite_elements_name_the_unit_for_scenes_without_tetrahedra(started: An
 def test_it_shows_what_finite_elements_show() -> None:
     for own, other in zip(LocalMechanics.fields, Mechanics.fields, strict=True):
         assert replace(own, depends_on=other.depends_on) == other
+
+
+# --- active stiffness ----------------------------------------------------------------------------------------------
+
+
+def _stabilised(started: Any, tension: float, stiffness: float, reference: float, **parameters: Any) -> float:
+    unit = started(LocalMechanics, build("cell", 1.0), parameters=parameters)
+    for name, value in (
+        ("active_stress", tension),
+        ("active_stiffness", stiffness),
+        ("reference_stretch", reference),
+    ):
+        unit.set(name, np.array([value]))
+    unit.do_step(0.0, 0.001)
+    return float(unit.get("stretch")[0])
+
+
+@pytest.mark.parametrize("stiffness", [200.0, 1000.0, 1e4])
+def test_stabilised_it_is_in_equilibrium_with_the_stress_at_its_own_stretch(stiffness: float, started: Any) -> None:
+    stretch = _stabilised(started, 400.0, stiffness, 1.0)
+    own = 400.0 + stiffness * (stretch - 1.0)
+    assert own < 390.0
+    assert stretch == pytest.approx(_stretch(started, own)[0], rel=1e-10)
+    # Of half of the stiffness half of it.
+    half = _stabilised(started, 400.0, stiffness, 1.0, stabilization=0.5)
+    assert half == pytest.approx(_stabilised(started, 400.0, 0.5 * stiffness, 1.0), rel=1e-12)
+    assert _stabilised(started, 400.0, stiffness, 1.0, stabilization=0.0) == _stretch(started, 400.0)[0]
+
+
+def test_without_a_reference_it_takes_the_stretch_of_the_last_exchange(started: Any) -> None:
+    unit = started(LocalMechanics, build("cell", 1.0), {})
+    expected = []
+    reference = 1.0
+    for number, tension in enumerate((200.0, 300.0, 250.0)):
+        unit.set("active_stress", np.array([tension]))
+        unit.set("active_stiffness", np.array([1000.0]))
+        unit.do_step(0.001 * number, 0.001)
+        expected.append(_stabilised(started, tension, 1000.0, reference))
+        reference = float(unit.get("stretch")[0])
+        assert reference == pytest.approx(expected[-1], rel=1e-10)
+    # Nothing has passed: the last exchange is still the same.
+    unit.do_step(0.003, 0.0)
+    assert float(unit.get("stretch")[0]) == pytest.approx(expected[-1], rel=1e-12)

@@ -7,6 +7,7 @@ import pytest
 from cardiac_cosim.units import kernels
 from cardiac_cosim.units.errors import InvalidInput, StepFailure
 from cardiac_cosim.units.fiber_generator import FiberGenerator
+from cardiac_cosim.units.geometry.registry import build
 from cardiac_cosim.units.mechanics import Mechanics
 from cardiac_cosim.units.mechanics.bulk import Tissue
 from cardiac_cosim.units.mechanics.elements.linear import linear
@@ -235,3 +236,59 @@ def test_equilibrium_costs_no_newton_steps_in_a_beat(contraction, monkeypatch: p
 
     monkeypatch.setattr("cardiac_cosim.units.mechanics.solvers.newton.Newton.solve", never)
     contraction()
+
+
+# --- without safeguards --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def held(started):
+    """A piece of wall, after its active stress went from 0 to a number of kPa in one step."""
+    wall = build("slab", 10.0)
+    fibers = started(FiberGenerator, wall)
+    directions = {name: fibers.get(name) for name in ("fiber", "sheet")}
+
+    def contracted(tension_kPa: float, **parameters: object) -> Mechanics:
+        unit = started(Mechanics, wall, parameters, **directions)
+        unit.set("active_stress", np.full(wall.nodes, tension_kPa))
+        unit.do_step(0.0, 0.001)
+        return unit
+
+    return contracted
+
+
+def test_plain_newton_finds_what_the_safeguarded_methods_find(held) -> None:
+    plain = held(50.0, safeguards="off", equilibrium_tolerance=1e-10)
+    safe = held(50.0, equilibrium_tolerance=1e-10)
+    np.testing.assert_allclose(plain.get("displacement"), safe.get("displacement"), rtol=0.0, atol=1e-9)
+
+
+def test_plain_newton_fails_under_a_load_that_safeguards_bear(held) -> None:
+    # What a map of increments of the active stress shows: it is the first step that goes too far.
+    with pytest.raises(StepFailure, match=r"It was tried without safeguards; use safeguards: on"):
+        held(500.0, safeguards="off")
+    assert held(500.0).get("stretch").min() < 0.7
+    # On the other side of the limit it needs none.
+    assert held(300.0, safeguards="off").get("stretch").min() < 0.8
+
+
+def test_plain_newton_takes_full_steps_with_a_new_tangent_each(held, monkeypatch: pytest.MonkeyPatch) -> None:
+    counts = {"tangent": 0, "residual": 0}
+    for name in counts:
+        kept = getattr(Solid, name)
+
+        def counted(self: Solid, *given: np.ndarray, name: str = name, kept=kept) -> object:
+            counts[name] += 1
+            return kept(self, *given)
+
+        monkeypatch.setattr(Solid, name, counted)
+    monkeypatch.setattr(Solid, "energy_and_residual", None)
+    held(50.0, safeguards="off", equilibrium_tolerance=1e-9, linear_solver="superlu")
+    # At rest a residual; then, quadratically, from a load of 50 kPa to nine digits.
+    assert counts["residual"] == counts["tangent"] + 2
+    assert 3 <= counts["tangent"] <= 6
+
+
+def test_plain_newton_stops_where_it_is_told(held) -> None:
+    with pytest.raises(StepFailure, match="after 2 iterations"):
+        held(50.0, safeguards="off", newton_iterations=2, equilibrium_tolerance=1e-10)

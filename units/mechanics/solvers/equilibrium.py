@@ -1,7 +1,7 @@
 """Static equilibrium of a solid: three methods, each slower and surer than the one before.
 
 A quasi-Newton method with factors of an earlier stiffness; Newton's method with a line search; and that again, with the
-loads raised in increments.
+loads raised in increments. Without these safeguards it is Newton's method alone.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from ..solid import Solid
 from .factored import Factored, Factors, NotConverged, Solution
 from .factorisation import Factorisation
 from .newton import Newton
+from .plain_newton import PlainNewton
 from .quasi_newton import QuasiNewton
 
 #: Halvings of a load increment before giving up.
@@ -35,6 +36,13 @@ class Convergence:
     )
     newton_iterations: int = parameter(
         25, "1", "Newton iterations before the load step is halved", at_least=1, below=1001
+    )
+    safeguards: str = parameter(
+        "on",
+        "1",
+        "on: stale factors first, then a line search, then increments of the loads; off: Newton's method alone with "
+        "full steps from the last equilibrium, there to show what the safeguards are for",
+        choices=("on", "off"),
     )
 
 
@@ -59,6 +67,9 @@ class Equilibrium:
         factors, limit = Factors(solid, factorisation), convergence.equilibrium_tolerance * force_scale
         self._fast = QuasiNewton(solid, factors, limit)
         self._sure = Newton(solid, factors, limit, convergence.newton_iterations)
+        self._plain = PlainNewton(solid, factors, limit, convergence.newton_iterations)
+        self._safeguards = convergence.safeguards == "on"
+        self._loads = solid.loads
 
     def solve(
         self, start: FloatArray, guess: FloatArray, before: FloatArray, loads: FloatArray, factored: Factored
@@ -71,8 +82,10 @@ class Equilibrium:
         Raises
         ------
         StepFailure
-            When the smallest increment fails too.
+            When the smallest increment fails too; without safeguards, when Newton's method fails.
         """
+        if not self._safeguards:
+            return self._without_safeguards(start, loads, factored)
         for method in (self._fast, self._sure):
             try:
                 return method.solve(guess, loads, factored)
@@ -89,7 +102,8 @@ class Equilibrium:
             except NotConverged as failure:
                 increment *= 0.5
                 if increment < 0.5**_LOAD_HALVINGS:
-                    largest = 1000.0 * loads[np.abs(loads).argmax()]
+                    stresses = loads[: self._loads]
+                    largest = 1000.0 * stresses[np.abs(stresses).argmax()]
                     raise StepFailure(
                         f"no equilibrium beyond {100.0 * done:.0f} % of the change of the loads (the largest is "
                         f"{largest:.4g} kPa): {failure}. Load steps down to 1/{2**_LOAD_HALVINGS} were tried. Take "
@@ -97,3 +111,11 @@ class Equilibrium:
                         "the pressures"
                     ) from None
         return solution
+
+    def _without_safeguards(self, start: FloatArray, loads: FloatArray, factored: Factored) -> Solution:
+        try:
+            return self._plain.solve(start, loads, factored)
+        except NotConverged as failure:
+            raise StepFailure(
+                f"{failure}. It was tried without safeguards; use safeguards: on, or take shorter communication steps"
+            ) from None

@@ -5,6 +5,7 @@ import numpy as np
 from ...arrays import FloatArray, frozen, inner
 from ..solid import Solid
 from .factored import Factored, Factors, NotConverged, Solution, largest
+from .newton_step import newton_step
 
 #: Decrease of energy, relative to the slope, that a step has to bring (Armijo).
 _SUFFICIENT = 1e-4
@@ -31,8 +32,9 @@ class Newton:
             if iteration == self._iterations:
                 break
             factored = Factored.here(displacement, loads)
-            step = self._factors.at(factored)(-residual)
-            if not np.isfinite(step).all() or inner(step, residual) >= 0.0:
+            step = newton_step(self._solid, self._factors.at(factored), displacement, loads, residual)
+            ascends = self._solid.is_symmetric(loads) and inner(step, residual) >= 0.0
+            if not np.isfinite(step).all() or ascends:
                 raise NotConverged("the tangent stiffness is not positive definite: the solid is unstable there")
             displacement, energy, residual = self.search(displacement, loads, step, energy, residual)
         raise NotConverged(
@@ -43,7 +45,11 @@ class Newton:
     def search(
         self, displacement: FloatArray, loads: FloatArray, step: FloatArray, energy: float, residual: FloatArray
     ) -> tuple[FloatArray, float, FloatArray]:
-        """A fraction of the Newton step that inverts no element and lowers the energy, or the residual along it."""
+        """A fraction of the Newton step that inverts no element and lowers the energy, or the residual along it.
+
+        Under loads that have no energy it lowers the residual.
+        """
+        symmetric = self._solid.is_symmetric(loads)
         slope = inner(step, residual)
         fraction = 1.0
         for _ in range(_HALVINGS):
@@ -52,9 +58,13 @@ class Newton:
             with np.errstate(over="ignore", invalid="ignore"):
                 trial_energy, trial_residual = self._solid.energy_and_residual(trial, loads)
                 less = abs(inner(step, trial_residual)) < _LESS_WORK * abs(slope)
-            # The latter decides near the minimum, where the energy's decrease drowns in rounding, and under loads that
-            # have no potential: a pressure on a surface whose rim moves.
-            if less or trial_energy <= energy + _SUFFICIENT * fraction * slope:
+                # Less work decides near the minimum, where the energy's decrease drowns in rounding, and under loads
+                # that have no potential: a pressure on a surface whose rim moves.
+                if symmetric:
+                    lower = trial_energy <= energy + _SUFFICIENT * fraction * slope
+                else:
+                    lower = _norm(trial_residual) <= (1.0 - _SUFFICIENT * fraction) * _norm(residual)
+            if less or lower:
                 return trial, trial_energy, trial_residual
             fraction *= 0.5
         ratio = self._solid.volume_ratio(displacement)
@@ -62,3 +72,7 @@ class Newton:
             f"no part of the Newton step lowers the energy (element {int(ratio.argmin())} is compressed most, volume "
             f"ratio {ratio.min():.3g})"
         )
+
+
+def _norm(residual: FloatArray) -> float:
+    return float(np.sqrt(inner(residual, residual)))
