@@ -150,6 +150,8 @@ def _fit(rows: Values, sizes: Values, delays: int) -> _Fit | None:
         return None
     states = np.hstack([rows[delays - back : delays - back + count] for back in range(delays + 1)])
     size = sizes[delays : delays + count - 1, None]
+    # A row may pass through zero.
+    size = np.where(size > 0.0, size, 1.0)
     before, after = states[:-1] / size, states[1:] / size
     scale = np.linalg.norm(before, axis=0)
     scale[scale == 0.0] = 1.0

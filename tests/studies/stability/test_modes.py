@@ -124,3 +124,11 @@ def test_what_has_no_modes_says_why() -> None:
         assert modes.radius is None
         assert why in modes.why
         assert not modes.grows
+
+
+def test_values_that_pass_through_zero_exactly_are_fitted_as_well() -> None:
+    # The limit case itself: 2, 0, 2, 0 rings for ever.
+    time = np.arange(60.0)
+    modes = fitted_modes({"time_ms": time, "a": 1.0 + (-1.0) ** time, "b": -1.0 - (-1.0) ** time})
+    assert modes.radius == pytest.approx(1.0, abs=1e-9)
+    assert not modes.grows
