@@ -197,7 +197,8 @@ class _Track:
 
     def suspected(self) -> Alternation | None:
         """What is to be told of the last steps if they were the last before the run failed."""
-        return self._judged(_SUSPICION, self._times[0])
+        # A run may fail before it has any value.
+        return self._judged(_SUSPICION, self._times[0]) if self._times else None
 
     def memory(self) -> dict[str, Any]:
         """For a checkpoint."""

@@ -146,6 +146,11 @@ def test_it_is_told_after_eight_alternations_and_not_before(ring: Any, master: A
     assert coupled.growth.found == {}
 
 
+def test_a_run_that_never_began_has_nothing_to_tell(ring: Any, master: Any) -> None:
+    coupled = master(ring(-1.5))
+    assert coupled.growth.suspected == coupled.growth.found == {}
+
+
 def test_what_is_kept_goes_on_to_the_bit(ring: Any, master: Any) -> None:
     for at in (0, 1, 3, 9, 21):
         whole, watch = _run(master, ring(-1.1), 30)
