@@ -49,6 +49,8 @@ class _Mapping:
             self._study.tolerances, self._study.measures or (), self._references.runs, plan.origin
         )
         self._predictor = None if plan.theory is None else Predictor(plan.theory, plan.base, plan.origin)
+        # All places of each panel that were run; theory may look at the moments of their references.
+        self._places = [list(grid.places) for grid in plan.grids]
 
     def whole(self) -> StabilityMap:
         """The map."""
@@ -62,7 +64,7 @@ class _Mapping:
         found = [brackets(grid.x, grid.y, of, self._holds) for grid, of in zip(plan.grids, own, strict=True)]
         bisected = self._halve(found)
         panels = [
-            self._panel(grid, [*own[number], *bisected[number]], found[number])
+            self._panel(grid, self._places[number], [*own[number], *bisected[number]], found[number])
             for number, grid in enumerate(plan.grids)
         ]
         return StabilityMap(
@@ -110,8 +112,8 @@ class _Mapping:
         return self._predictor.amplification(place.point.scenario, self._references.folder(place))
 
     def _holds(self, cell: Cell) -> bool:
-        """Whether a cell is on the good side: theory speaks of stability, without one all that is wrong counts."""
-        return cell.is_sound if self._predictor is None else cell.is_stable
+        """Whether a cell is on the good side: a theory speaks of stability, unless accuracy is asked for."""
+        return cell.is_stable if self._predictor is not None and not self._study.tolerances else cell.is_sound
 
     # --- the boundary as it is measured -------------------------------------------------------------------------------
 
@@ -125,6 +127,8 @@ class _Mapping:
             ]
             every = [place for own in places for place in own if place is not None]
             self._references.run(every)
+            for known, new in zip(self._places, places, strict=True):
+                known += [place for place in new if place is not None]
             cells = iter(self._cells(every, f"halving {level + 1}") if every else ())
             for number, own in enumerate(found):
                 middles = [None if place is None else next(cells) for place in places[number]]
@@ -139,8 +143,8 @@ class _Mapping:
 
     # --- the boundary as it is predicted ------------------------------------------------------------------------------
 
-    def _panel(self, grid: Grid, cells: Sequence[Cell], found: Sequence[Bracket]) -> Panel:
-        limit = self._limit(grid)
+    def _panel(self, grid: Grid, places: Sequence[Place], cells: Sequence[Cell], found: Sequence[Bracket]) -> Panel:
+        limit = self._limit(grid, places)
         crossings = [self._crossing(grid, bracket, limit) for bracket in found]
         curves = limit.curves() if limit is not None and grid.x.is_numeric and grid.y.is_numeric else []
         return Panel(grid.line.name, grid.x.key, grid.y.key, grid.x.values, grid.y.values, cells, crossings, curves)
@@ -151,13 +155,13 @@ class _Mapping:
             return crossing
         return replace(crossing, predicted=nearest(grid.y, limit.at(bracket.x), crossing.measured))
 
-    def _limit(self, grid: Grid) -> Limit | None:
+    def _limit(self, grid: Grid, places: Sequence[Place]) -> Limit | None:
         predictor = self._predictor
         if predictor is None or not grid.y.is_numeric:
             return None
 
         def amplification(x: Any, y: float) -> float | None:
-            place = _nearest_place(grid, x, y)
+            place = _nearest_place(grid, places, x, y)
             if place.point is None or not predictor.applies(place.point.scenario):
                 return None
             try:
@@ -199,13 +203,13 @@ class _Mapping:
         return notes
 
 
-def _nearest_place(grid: Grid, x: Any, y: float) -> Place:
-    """The place of the grid that is nearest to values on its axes, along x first."""
+def _nearest_place(grid: Grid, places: Sequence[Place], x: Any, y: float) -> Place:
+    """The one of the places that is nearest to values on the axes of the grid, along x first."""
 
     def apart(axis: Axis, value: Any, other: Any) -> float:
         return abs(axis.place(value) - axis.place(other)) if axis.is_numeric else float(value != other)
 
-    runnable = [place for place in grid.places if place.point is not None] or grid.places
+    runnable = [place for place in places if place.point is not None] or places
     return min(runnable, key=lambda place: (apart(grid.x, place.x, x), apart(grid.y, place.y, y)))
 
 
