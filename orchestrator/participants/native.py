@@ -160,14 +160,11 @@ def stability_theory(name: str) -> Theory:
     return THEORIES[name]
 
 
-def unit_setting(unit: str, parameters: Parameters, ramps: bool) -> Setting | None:
-    """A unit as theories see it, with its defaults; None for one that never steps, because its outputs are fixed.
+def unit_setting(unit: str, parameters: Parameters, ramps: bool) -> Setting:
+    """A unit as theories see it, with its defaults.
 
     `ramps` says that the coupling lets inputs run linearly over a step.
     """
-    kind = _kind(unit)
-    if all(variable.fixed for variable in kind.outputs()):
-        return None
     declared = {name: variable.start for name, variable in _declared_parameters(unit).items()}
     linear = {INPUT_INTERPOLATION: "linear"} if ramps and INPUT_INTERPOLATION in declared else {}
     return Setting(unit, declared | linear | dict(parameters))

@@ -88,7 +88,7 @@ class Predictor:
     # --- inside -------------------------------------------------------------------------------------------------------
 
     def _units(self, scenario: Scenario) -> dict[str, Setting]:
-        """The units that step, in their order."""
+        """The units in their order, those first that it does not name, because they never step."""
         ramps = scenario.coupling.interpolation == "linear"
         found: dict[str, Setting] = {}
         for name, entry in scenario.units.items():
@@ -99,9 +99,10 @@ class Predictor:
                 )
             if entry.unit is None:
                 found[name] = Setting(_FMU, dict(entry.parameters) | dict(entry.start))
-            elif (setting := unit_setting(entry.unit, entry.parameters, ramps)) is not None:
-                found[name] = setting
-        return {name: found[name] for name in scenario.coupling.order or found if name in found}
+            else:
+                found[name] = unit_setting(entry.unit, entry.parameters, ramps)
+        order = scenario.coupling.order or ()
+        return {name: found[name] for name in [*(name for name in found if name not in order), *order]}
 
     def _coupled(self, scenario: Scenario, units: dict[str, Setting], reference: Path | None) -> Coupled:
         coupling = scenario.coupling

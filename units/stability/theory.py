@@ -35,7 +35,7 @@ class Coupled:
     Parameters
     ----------
     units:
-        By their names in the scenario, in the order in which they step.
+        By their names in the scenario, in the order in which they step; those that never do come first.
     jacobi:
         Whether all units step at once, and not one after the other.
     step_ms:

@@ -10,6 +10,7 @@ from cardiac_cosim.studies.bench import Bench
 from cardiac_cosim.studies.stability import StabilityMap, map_study, plan_map
 from cardiac_cosim.units.errors import InvalidInput
 from cardiac_cosim.units.stability import registry
+from cardiac_cosim.units.stability.theory import Theory
 from oscillator import Oscillator
 
 _SCENARIO = """\
@@ -45,7 +46,7 @@ def _timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cardiac_cosim.studies.bench._REPEATS_S", 0.0)
 
 
-class Masses:
+class Masses(Theory):
     """The tests' own theory of the oscillator."""
 
     name: ClassVar[str] = "masses"
