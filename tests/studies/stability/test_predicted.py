@@ -74,8 +74,8 @@ def test_units_have_all_their_parameters_and_a_sound_run_lends_its_moments(
     (panel,) = mapped(study).panels
     assert [cell.predicted for cell in panel.cells] == [0.4, 2.0, 0.4, 2.0]
     held, linear = asking.asked[0], asking.asked[2]
-    # Fibres are exchanged once.
-    assert list(held.units) == ["electrophysiology", "active_stress", "mechanics"]
+    # Fibres are exchanged once, before all others.
+    assert list(held.units) == ["fibers", "electrophysiology", "active_stress", "mechanics"]
     assert [unit.kind for unit in held.units.values()] == ["electrophysiology", "active_stress", "local_mechanics"]
     given = held.units["active_stress"].parameters
     assert (given["slow_rate_per_ms"], given["fast_rate_per_ms"]) == (0.2, 1.0)
