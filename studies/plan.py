@@ -106,10 +106,10 @@ class Variants:
 
     def _check_units(self, settings: Mapping[str, Any]) -> None:
         """InputError for a setting of a unit that the scenario does not have: it would become one without content."""
-        units = self._content.get("units")
+        units = settings.get("units", self._content.get("units"))
         for key in settings:
             section, *rest = key.split(".")
-            if section == "units" and len(rest) > 1 and isinstance(units, dict) and rest[0] not in units:
+            if section == "units" and len(rest) > 1 and isinstance(units, Mapping) and rest[0] not in units:
                 raise InputError(f"'{key}': the scenario has no unit '{rest[0]}'{did_you_mean(rest[0], units)}")
 
     def point(self, settings: Mapping[str, Any], where: str = "", span: Span | None = None) -> Point:

@@ -49,13 +49,13 @@ class Measure:
     between: Callable[[StoredRun, StoredRun], Difference]
 
 
-def measures(run: StoredRun) -> dict[str, Measure]:
-    """All measures that `run` has, by name.
+def measures(run: StoredRun, still: bool = False) -> dict[str, Measure]:
+    """All measures that `run` has, by name; with `still` also those of what never changes in it.
 
     `activation_ms` is the largest difference of the activation at any probe. Every column of numbers in the time
     series gives the largest difference at any time, and every field that moves the root mean square over its nodes or
     elements, at the time at which that is largest. Of a field of times (`activation_time_ms`) the last frame counts.
-    What never changes measures nothing, and is left out.
+    What never changes measures nothing where all runs are alike, and is left out.
     """
     found = {}
     times = run.summary.get("activation_time_ms") or {}
@@ -63,10 +63,10 @@ def measures(run: StoredRun) -> dict[str, Measure]:
         found[ACTIVATION] = Measure(ACTIVATION, "ms", "activation at the probes, largest difference", _activation)
     for column, values in run.columns.items():
         known = values[np.isfinite(values)]
-        if column != "time_ms" and len(known) and np.any(known != known[0]):
+        if column != "time_ms" and len(known) and (still or np.any(known != known[0])):
             text = f"{_spoken(column)}, largest difference at any time"
             found[column] = Measure(column, unit_of(column), text, partial(_curve, column))
-    for name in filter(partial(_moves, run), run.moving):
+    for name in run.moving if still else filter(partial(_moves, run), run.moving):
         compare: Callable[[str, StoredRun, StoredRun], Difference] = _events if name.endswith(_EVENTS) else _field
         when = "at the end" if name.endswith(_EVENTS) else "at the worst time"
         text = f"{_spoken(name)}, root mean square over the mesh {when}"

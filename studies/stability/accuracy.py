@@ -38,14 +38,15 @@ class Accuracy:
         self._known: dict[str, Measure] = {}
         for reference in references:
             if any(name not in self._known for name in self._names):
-                self._known |= measures(reference)
+                # One that stays at rest tells of a run that does not.
+                self._known |= measures(reference, still=True)
         # Without any reference nothing is judged, and each run says why.
         for name in self._names if self._known else ():
             if name not in self._known:
                 key = "tolerances" if name in self._allowed else "measures"
                 raise InputError(
-                    f"{origin}: {key}: the scenario has no '{name}', or it never changes"
-                    f"{did_you_mean(name, self._known)}; name a quantity that the scenario records and that moves"
+                    f"{origin}: {key}: the scenario has no '{name}'"
+                    f"{did_you_mean(name, self._known)}; name a quantity that the scenario records"
                 )
 
     def judged(self, trial: Trial, reference: StoredRun | str | None) -> Judgement:

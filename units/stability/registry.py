@@ -6,6 +6,7 @@ from .feedback import Feedback
 from .loop_gain import LoopGain
 from .pinned_front import PinnedFront
 from .reaction_step import ReactionStep
+from .resting_tissue import RestingTissue
 from .theory import Theory
 from .two_masses import TwoMasses
 
@@ -17,6 +18,7 @@ _ALL: tuple[Theory, ...] = (
     ActiveStressStep(),
     ExplicitDiffusion(),
     PinnedFront(),
+    RestingTissue(),
 )
 
 THEORIES: dict[str, Theory] = {theory.name: theory for theory in _ALL}

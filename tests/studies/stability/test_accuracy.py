@@ -22,7 +22,7 @@ def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StoredRun:
     known = {
         name: Measure(name, unit, name, lambda *_, found=found: found) for name, (unit, found) in differences.items()
     }
-    monkeypatch.setattr("cardiac_cosim.studies.stability.accuracy.measures", lambda run: known)
+    monkeypatch.setattr("cardiac_cosim.studies.stability.accuracy.measures", lambda run, still: known)
     return StoredRun(tmp_path)
 
 
@@ -62,3 +62,14 @@ def test_a_measure_that_there_is_not_is_told(reference: StoredRun, key: str) -> 
     allowed, measured = ({"lv_volume": 1.0}, ()) if key == "tolerances" else ({}, ("lv_volume",))
     with pytest.raises(InputError, match=rf"^study.yaml: {key}: the scenario has no 'lv_volume'.*'lv_volume_ml'\?"):
         Accuracy(allowed, measured, [reference], "study.yaml")
+
+
+def test_a_run_is_judged_against_a_reference_at_rest(tmp_path: Path) -> None:
+    for name, values in (("rest", (1.0, 1.0)), ("moves", (1.0, 4.0))):
+        (tmp_path / name).mkdir()
+        rows = "".join(f"{time},{value}\n" for time, value in enumerate(values))
+        (tmp_path / name / "timeseries.csv").write_text(f"time_ms,a_mm\n{rows}")
+    rest = StoredRun(tmp_path / "rest")
+    accuracy = Accuracy({"a_mm": 2.0}, (), [rest], "study.yaml")
+    assert accuracy.judged(Trial(tmp_path / "moves", DONE), rest).exceeded == "a_mm errs by 3 mm, allowed are 2"
+    assert accuracy.judged(Trial(tmp_path / "rest", DONE), rest) == Judgement({"a_mm": 0.0})
