@@ -10,6 +10,8 @@ _UNITS = {"deg": "°", "mm2": "mm²"} | {
 _UNIT = "|".join(_UNITS)
 _NAME = re.compile(rf"(?P<name>.+?)(?:_(?P<unit>{_UNIT}))?(?:_per_(?P<per>{_UNIT}))?")
 
+_SYMBOL = re.compile(r"[A-Za-z]_\w{1,2}")
+
 
 def axis_words(key: str) -> str:
     """The last part of a key with its unit of measure: `coupling.step_ms` becomes `step (ms)`."""
@@ -21,7 +23,9 @@ def axis_words(key: str) -> str:
     measured = _UNITS[unit] if unit else "1" if per else ""
     if per:
         measured += f"/{_UNITS[per]}"
-    return name.replace("_", " ") + (f" ({measured})" if measured else "")
+    # A symbol with an index, k_c, stays one.
+    words = name if _SYMBOL.fullmatch(name) else name.replace("_", " ")
+    return words + (f" ({measured})" if measured else "")
 
 
 def pair_words(x_key: str, y_key: str) -> tuple[str, str]:

@@ -38,6 +38,7 @@ class PinnedFront(Theory):
 
     name: ClassVar[str] = "pinned_front"
     formula: ClassVar[str] = "a front passes where d β_t/(c h²) exceeds that of the last standing front"
+    costly: ClassVar[bool] = True
     of_exchange: ClassVar[bool] = False
 
     def amplification(self, coupled: Coupled) -> float:

@@ -73,7 +73,7 @@ class Theory(Protocol):
     name: ClassVar[str]
     #: The condition of stability, for a person: `|g| < 1, g = −K_a/K_p`.
     formula: ClassVar[str]
-    #: Whether an evaluation takes a second or more: it is asked less often then.
+    #: Whether an evaluation takes long: it is asked at the values of a study only then.
     costly: ClassVar[bool] = False
     #: Whether it is of explicit exchange: it is not asked of coupling that is iterated or adaptive then. Others are of
     #: steps inside of units, or of their meshes, whatever the coupling.
