@@ -1,6 +1,7 @@
 """If this failed, the documentation would tell a newcomer something that is not so."""
 
 import importlib.util
+import re
 import shlex
 import sys
 from itertools import pairwise
@@ -9,6 +10,8 @@ from typing import Any
 
 import pytest
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.studies.stability import plan_map
+from cardiac_cosim.units.stability.registry import THEORIES
 
 _ROOT = Path(__file__).parent.parent
 
@@ -75,6 +78,18 @@ def test_every_scenario_is_valid() -> None:
         assert load_scenario(scenario).name == scenario.stem
 
 
+def test_the_study_that_the_page_on_stability_shows_is_one(tmp_path: Path) -> None:
+    text = (_ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    (block,) = [part.split("```")[0] for part in text.split("```yaml\n")[1:]]
+    study = tmp_path / "study.yaml"
+    study.write_text(block.replace("../", f"{_ROOT / 'scenarios'}/"), encoding="utf-8")
+    assert plan_map(study, ()).theory is not None
+    for name in THEORIES:
+        assert f"`{name}`" in text
+    for study in (_ROOT / "scenarios" / "stability").glob("*.yaml"):
+        assert f"<!-- {study.stem}: " in text, f"docs/stability.md says nothing of {study.stem}"
+
+
 def test_supported_python_is_the_one_that_runs() -> None:
     assert (3, 11) <= sys.version_info[:2] <= (3, 13)
 
@@ -84,12 +99,25 @@ def test_the_example_for_python_runs_as_it_stands(tmp_path: Path, monkeypatch: p
     monkeypatch.chdir(tmp_path)
     text = (_ROOT / "docs" / "python.md").read_text(encoding="utf-8")
     blocks = [block.split("```")[0] for block in text.split("```python\n")[1:]]
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     names: dict[str, Any] = {}
-    # The last one, a study, takes longer than all others; it is run for a part of its time.
+    # The last two, studies, take longer than all others; they are run in part.
+    (tmp_path / "small.yaml").write_text(
+        _shortened((_ROOT / "scenarios" / "stability" / "stretch_rate.yaml").read_text(encoding="utf-8"))
+    )
     for block in blocks:
-        exec(block.replace('["run.participants=native"]', '["run.participants=native", "run.stop_ms=40"]'), names)
+        short = block.replace('["run.participants=native"]', '["run.participants=native", "run.stop_ms=40"]')
+        exec(short.replace("scenarios/stability/stretch_rate.yaml", "small.yaml"), names)
     assert names["run"].summary["activation_time_ms"]["near"] > 10.0
     assert len(names["series"]) == 61
     assert names["potential"].shape == (len(names["run"].points_mm),)
     assert (tmp_path / "results" / "strand_coupling" / "chart.csv").is_file()
+    assert (tmp_path / "results" / "stretch_rate" / "stability.html").is_file()
+    assert all(crossing.predicted for crossing in names["found"].panels[0].crossings)
+
+
+def _shortened(study: str) -> str:
+    """The study of the rate with two values on each axis, halved once."""
+    study = study.replace("../", "scenarios/").replace("bisect: 8", "bisect: 1").replace("steps: 100", "steps: 30")
+    study = re.sub(r"rate_gain_ms: \[.*\]", "rate_gain_ms: [0.5, 1]", study)
+    return re.sub(r"step_ms: \[.*\]", "step_ms: [0.5, 4]", study)
