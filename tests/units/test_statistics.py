@@ -25,6 +25,8 @@ _MOVING = {
     "active_stress": ["active_stress", "active_stiffness", "reference_stretch"],
     "mechanics": ["stretch", "displacement"],
     "local_mechanics": ["stretch", "displacement"],
+    "mass": [],
+    "response": [],
 }
 
 

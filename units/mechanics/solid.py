@@ -1,8 +1,8 @@
 """The discretised solid: energy, out-of-balance forces and stiffness of tissue under its loads.
 
 A solid is put together of parts that know nothing of each other: elements (`elements`), passive laws (`laws`), active
-stress and surface loads (`loads`). All but the active
-stiffness have a potential, so that an equilibrium is the minimum of an energy.
+stress and surface loads (`loads`). All but the active stiffness have a potential, so that an equilibrium is the minimum
+of an energy.
 
 What changes from step to step is the vector of loads: the active stress at the mesh's nodes, then a size for every
 variable surface load, all in MPa. The vector may go on with the active stiffness at the nodes in MPa and the stretch of

@@ -76,7 +76,8 @@ def test_units_have_all_their_parameters_and_a_sound_run_lends_its_moments(
     held, linear = asking.asked[0], asking.asked[2]
     # Fibres are exchanged once, before all others.
     assert list(held.units) == ["fibers", "electrophysiology", "active_stress", "mechanics"]
-    assert [unit.kind for unit in held.units.values()] == ["electrophysiology", "active_stress", "local_mechanics"]
+    kinds = ["fiber_generator", "electrophysiology", "active_stress", "local_mechanics"]
+    assert [unit.kind for unit in held.units.values()] == kinds
     given = held.units["active_stress"].parameters
     assert (given["slow_rate_per_ms"], given["fast_rate_per_ms"]) == (0.2, 1.0)
     assert (held.linear, given["input_interpolation"]) == (False, "hold")
