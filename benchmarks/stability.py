@@ -5,6 +5,7 @@ of the page.
 """
 
 import argparse
+import os
 from pathlib import Path
 from shutil import copyfile
 
@@ -26,7 +27,7 @@ def stability_map(name: str) -> StabilityMap:
     """Map a study of that name, and put its figure into the documentation."""
     plan = plan_map(STUDIES / f"{name}.yaml")
     folder = _ROOT / "results" / plan.study.name
-    with Bench(folder, Console()) as bench:
+    with Bench(folder, Console(), workers=os.cpu_count()) as bench:
         found = map_study(plan, bench)
     write_map(found, folder)
     _IMAGES.mkdir(parents=True, exist_ok=True)

@@ -53,7 +53,7 @@ def _stress(folder: Path, *sets: str) -> np.ndarray:
     return np.asarray(_run(_CELL, folder, *_COMMON, *sets)["timeseries"]["active_stress_mean_kPa"])
 
 
-@pytest.mark.parametrize("step", [1.0, 0.25])
+@pytest.mark.parametrize("step", [1.0, pytest.param(0.25, marks=pytest.mark.long)])
 @pytest.mark.parametrize("scheme", [_HELD, _JACOBI], ids=["gauss-seidel", "jacobi"])
 def test_explicit_coupling_fails_beyond_a_gain_of_one_and_holds_stabilised(
     scheme: tuple[str, ...], step: float, tmp_path: Path
@@ -81,7 +81,7 @@ def test_half_of_the_stiffness_is_enough_where_the_formula_says_so(tmp_path: Pat
     ("inputs", "order", "steps"),
     [
         (_HELD, 1.0, (0.25, 0.125)),
-        (_JACOBI, 1.0, (0.25, 0.125)),
+        pytest.param(_JACOBI, 1.0, (0.25, 0.125), marks=pytest.mark.long),
         (_LINEAR, 2.0, (0.5, 0.25)),
     ],
     ids=["gauss-seidel", "jacobi", "linear inputs"],

@@ -40,7 +40,12 @@ def _passes(size_mm: float, out: Path, **changed: object) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("mass", "current"), [("lumped", "nodal"), ("consistent", "nodal"), ("consistent", "quadrature")]
+    ("mass", "current"),
+    [
+        ("lumped", "nodal"),
+        pytest.param("consistent", "nodal", marks=pytest.mark.long),
+        pytest.param("consistent", "quadrature", marks=pytest.mark.long),
+    ],
 )
 def test_a_wave_passes_just_below_the_predicted_threshold_and_stops_just_above(
     mass: str, current: str, tmp_path: Path
