@@ -49,7 +49,7 @@ def _boundary(panel: Panel) -> str:
     if not panel.crossings:
         return "none"
     y = panel.y_key.rpartition(".")[2]
-    places = [f"{value_text(each.x)}: {each.measured:.4g}" for each in panel.crossings]
+    places = [f"{Path(value_text(each.x)).name}: {each.measured:.4g}" for each in panel.crossings]
     known = [each for each in panel.crossings if each.predicted is not None]
     apart = max((abs(each.measured / each.predicted - 1.0) for each in known if each.predicted), default=None)
     told = f"{y} {', '.join(places)} at {panel.x_key.rpartition('.')[2]}"
