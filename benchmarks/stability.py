@@ -12,7 +12,8 @@ from shutil import copyfile
 from cardiac_cosim.studies.bench import Bench
 from cardiac_cosim.studies.point import value_text
 from cardiac_cosim.studies.stability import map_study, plan_map, write_map
-from cardiac_cosim.studies.stability.map import KINDS, Panel, StabilityMap
+from cardiac_cosim.studies.stability.counts import apart, counted
+from cardiac_cosim.studies.stability.map import Panel, StabilityMap
 from rich.console import Console
 
 from .page import write_between
@@ -37,11 +38,12 @@ def stability_map(name: str) -> StabilityMap:
 
 def table(found: StabilityMap) -> str:
     """What each panel has: cells by class, and how far the boundary is from the predicted one at most."""
-    kinds = [kind for kind in KINDS if any(cell.kind == kind for cell in found.cells)]
+    kinds = list(counted(found.cells))
     rows = [f"| | {' | '.join(kinds)} | boundary |", "|---" * (2 + len(kinds)) + "|"]
     for panel in found.panels:
-        counts = [str(sum(cell.kind == kind for cell in panel.cells)) for kind in kinds]
-        rows.append(f"| {panel.name} | {' | '.join(counts)} | {_boundary(panel)} |")
+        numbers = counted(panel.cells)
+        cells = [str(numbers.get(kind, 0)) for kind in kinds]
+        rows.append(f"| {panel.name} | {' | '.join(cells)} | {_boundary(panel)} |")
     return "\n".join(rows)
 
 
@@ -50,10 +52,9 @@ def _boundary(panel: Panel) -> str:
         return "none"
     y = panel.y_key.rpartition(".")[2]
     places = [f"{Path(value_text(each.x)).name}: {each.measured:.4g}" for each in panel.crossings]
-    known = [each for each in panel.crossings if each.predicted is not None]
-    apart = max((abs(each.measured / each.predicted - 1.0) for each in known if each.predicted), default=None)
+    known = [distance for each in panel.crossings if (distance := apart(each)) is not None]
     told = f"{y} {', '.join(places)} at {panel.x_key.rpartition('.')[2]}"
-    return told if apart is None else f"{told}; theory at most {100.0 * apart:.1f} % away"
+    return f"{told}; theory at most {100.0 * max(map(abs, known)):.1f} % away" if known else told
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ...orchestrator.quoting import shortened
 from ..pictures.legend import Entry, draw_column, draw_rows, rows_height_in
 from ..pictures.lettering import broken, plain
-from ..pictures.picture_files import write_pictures
+from ..pictures.picture_files import write_figure
 from ..pictures.provenance import machine_text, note_texts
 from ..pictures.sheet import axes_at, words_at, write_lines
 from .caption import cost_text, reference_text
@@ -64,9 +64,7 @@ def draw(chart: Chart) -> Figure:
 
 def write_figures(chart: Chart, folder: Path, stem: str = "chart") -> list[Path]:
     """Write `chart.png` and `chart.svg` into `folder`, or the same called after `stem`; returns the files."""
-    paths = {kind: folder / f"{stem}.{kind}" for kind in ("png", "svg")}
-    write_pictures(draw(chart), paths, {"hashsalt": "cardiac-cosim"})
-    return list(paths.values())
+    return write_figure(draw(chart), folder, stem)
 
 
 # --- inside -----------------------------------------------------------------------------------------------------------

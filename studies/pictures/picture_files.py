@@ -12,6 +12,16 @@ from ...orchestrator.results.whole import write_whole
 
 _DOTS_PER_INCH = 160
 
+#: The same SVG for the same content.
+_SVG = {"hashsalt": "cardiac-cosim"}
+
+
+def write_figure(figure: Figure, folder: Path, stem: str) -> list[Path]:
+    """Write `figure` into `folder` as PNG and as SVG, called after `stem`; returns the files."""
+    paths = {kind: folder / f"{stem}.{kind}" for kind in ("png", "svg")}
+    write_pictures(figure, paths, _SVG)
+    return list(paths.values())
+
 
 def write_pictures(figure: Figure, paths: Mapping[str, Path], svg: Mapping[str, str]) -> None:
     """Write `figure` to `paths` by format, `png` and `svg`; `svg` are Matplotlib's settings for the latter."""

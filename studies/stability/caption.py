@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ...orchestrator.results.comparison import unit_of
 from ..pictures.provenance import machine_text, note_texts
+from .counts import apart
 from .map import StabilityMap
 from .placed_panel import PlacedPanel
 
@@ -34,12 +35,8 @@ def theory_text(found: StabilityMap, placed: list[PlacedPanel]) -> str:
 
 def agreement_text(found: StabilityMap) -> str:
     """How far measured crossings are from predicted ones; empty where there are none to compare."""
-    distances = [
-        abs(crossing.measured / crossing.predicted - 1.0)
-        for panel in found.panels
-        for crossing in panel.crossings
-        if crossing.predicted
-    ]
+    known = [apart(crossing) for panel in found.panels for crossing in panel.crossings]
+    distances = [abs(distance) for distance in known if distance is not None]
     if not distances:
         return ""
     where = "At one place" if len(distances) == 1 else f"At all of {len(distances)} places"

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from ...orchestrator.quoting import shortened
 from ..pictures.legend import draw_rows, rows_height_in
 from ..pictures.lettering import broken, name_lines, plain
-from ..pictures.picture_files import write_pictures
+from ..pictures.picture_files import write_figure
 from ..pictures.sheet import axes_at, words_at, write_lines
 from .axis_words import pair_words
 from .caption import sentences, title
@@ -61,9 +61,7 @@ def draw(found: StabilityMap) -> Figure:
 
 def write_figures(found: StabilityMap, folder: Path, stem: str = "stability") -> list[Path]:
     """Write `stability.png` and `stability.svg` into `folder`, or the same called after `stem`; returns the files."""
-    paths = {kind: folder / f"{stem}.{kind}" for kind in ("png", "svg")}
-    write_pictures(draw(found), paths, {"hashsalt": "cardiac-cosim"})
-    return list(paths.values())
+    return write_figure(draw(found), folder, stem)
 
 
 # --- inside -----------------------------------------------------------------------------------------------------------

@@ -1,26 +1,20 @@
 """What the signs of a map mean: its classes with the numbers of their cells, boundaries, and runs between the grid."""
 
-from collections import Counter
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
 from ..pictures.legend import Entry, Sample, area_sample, in_rows
+from .counts import counted
 from .drawn_panel import draw_crossing, draw_limit, draw_mark
 from .look import LOOKS
-from .map import KINDS, StabilityMap
+from .map import StabilityMap
 from .placed_panel import PlacedPanel
 
 #: Inches: the height of a swatch, of a measured boundary's bar, and the width of the sign of a run between.
 _SWATCH_IN, _BAR_IN, _STRIP_IN = 0.145, 0.065, 0.32
 
 MEASURED, BETWEEN = "measured boundary", "run of the bisection"
-
-
-def counts(found: StabilityMap) -> list[tuple[str, int]]:
-    """The classes that occur, the soundest first, and how many cells each has."""
-    number = Counter(cell.kind for cell in found.cells)
-    return [(kind, number[kind]) for kind in KINDS if number[kind]]
 
 
 def theory_words(found: StabilityMap) -> str:
@@ -30,7 +24,8 @@ def theory_words(found: StabilityMap) -> str:
 
 def entries(found: StabilityMap, placed: Sequence[PlacedPanel], longest_in: float) -> list[list[Entry]]:
     """Rows of entries for the signs that occur: a row of classes, and one of boundaries."""
-    classes = [(area_sample(_SWATCH_IN, **LOOKS[kind].area), f"{kind} ({number})") for kind, number in counts(found)]
+    numbers = counted(found.cells)
+    classes = [(area_sample(_SWATCH_IN, **LOOKS[kind].area), f"{kind} ({numbers[kind]})") for kind in numbers]
     signs: list[tuple[Sample, str]] = []
     if any(each.limit for each in placed):
         signs.append((_limit_sample, theory_words(found)))

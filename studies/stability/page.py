@@ -9,7 +9,8 @@ from ..pictures.provenance import versions_text
 from ..point import told, value_text
 from .axis_words import axis_words
 from .caption import error_text, sentences, title
-from .key import BETWEEN, MEASURED, counts, theory_words
+from .counts import counted
+from .key import BETWEEN, MEASURED, theory_words
 from .look import LOOKS, TILE_PX
 from .map import Cell, Panel, StabilityMap
 from .placed_panel import PlacedPanel, placed_panel
@@ -92,7 +93,7 @@ def _patterns() -> str:
 
 
 def _key(found: StabilityMap, placed: list[PlacedPanel]) -> str:
-    said = [f"{_swatch(kind)}{safe(kind)} ({number})" for kind, number in counts(found)]
+    said = [f"{_swatch(kind)}{safe(kind)} ({number})" for kind, number in counted(found.cells).items()]
     if any(each.limit for each in placed):
         said.append(_sign(_LINE) + safe(theory_words(found)))
     if any(each.crossings for each in placed):

@@ -38,9 +38,16 @@ lines:
 
 
 @pytest.fixture
-def study(tmp_path: Path) -> Path:
+def small_cell(tmp_path: Path) -> Path:
+    """The file of a scenario of one cell."""
+    path = tmp_path / "small_cell.yaml"
+    path.write_text(_SCENARIO)
+    return path
+
+
+@pytest.fixture
+def study(tmp_path: Path, small_cell: Path) -> Path:
     """The file of a study, next to its scenario."""
-    (tmp_path / "small_cell.yaml").write_text(_SCENARIO)
     path = tmp_path / "steps.yaml"
     path.write_text(STUDY)
     return path

@@ -23,9 +23,9 @@ from ..electrophysiology.time_scale import TimeScale
 from ..electrophysiology.unit import Resolution
 from ..errors import InvalidInput
 from ..fiber_generator import FiberGenerator
-from ..mesh import Mesh
 from ..mesh.refinement import refined
 from .reaction_step import fastest_decay, substep_ms, two_stages
+from .started import started
 from .theory import Coupled, Theory
 
 #: Systems of which the eigenvalue is remembered.
@@ -59,7 +59,9 @@ class ExplicitDiffusion(Theory):
         key = (mesh.fingerprint, conduction, time_scale, levels, _bits(directions), _bits(stretch))
         if key not in self._known:
             inner = refined(mesh, levels)
-            fiber = directions if isinstance(directions, np.ndarray) else _generated(mesh, directions)
+            fiber = directions
+            if not isinstance(fiber, np.ndarray):
+                fiber = np.asarray(started(FiberGenerator, mesh, fiber, {}).get("fiber"))
             equation = Monodomain(inner.mesh, fiber[inner.parents], time_scale, conduction)
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
@@ -73,15 +75,6 @@ def _directions(coupled: Coupled) -> FloatArray | Mapping[str, Any]:
         if "fiber" in moment:
             return moment["fiber"]
     return coupled.only("fiber_generator").parameters
-
-
-def _generated(mesh: Mesh, parameters: Mapping[str, Any]) -> FloatArray:
-    generator = FiberGenerator(mesh)
-    generator.instantiate(parameters)
-    generator.setup_experiment()
-    generator.enter_initialization_mode()
-    generator.exit_initialization_mode()
-    return np.asarray(generator.get("fiber"))
 
 
 def _bits(given: FloatArray | Mapping[str, Any] | None) -> Hashable:

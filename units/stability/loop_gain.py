@@ -13,8 +13,8 @@ where the moments hold them (`lv_pressure`, `rv_pressure` in kPa). A stabilised 
 active stress does, so that of every eigenvalue the same is left as of one gain.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, TypeVar
+from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -30,9 +30,8 @@ from ..mesh import Mesh
 from ..mesh.averages import around_nodes
 from ..unit import Unit
 from .recurrence import amplification, stabilised
+from .started import started
 from .theory import Coupled, Moment, Theory
-
-Started = TypeVar("Started", bound=Unit)
 
 _KPA_PER_MPA = 1000.0
 
@@ -89,7 +88,7 @@ class LoopGain(Theory):
         mesh = coupled.mesh()
         average = around_nodes(mesh.cells, mesh.volumes)
         moments: Sequence[Moment] = coupled.moments() or [_plateau(coupled, mesh)]
-        unit = _started(_MECHANICS[mechanics.kind], mesh, mechanics.parameters, moments[0])
+        unit = started(_MECHANICS[mechanics.kind], mesh, mechanics.parameters, moments[0])
         gains = []
         for moment in moments:
             for name in moment.keys() & _changing(type(unit)):
@@ -137,8 +136,8 @@ def _plateau(coupled: Coupled, mesh: Mesh) -> Moment:
     directions = _directions(coupled, mesh)
     stress_setting, mechanics = coupled.only(ActiveStress.name), coupled.only(*_MECHANICS)
     # The settled state is the same, and these reach it by any step.
-    stress = _started(ActiveStress, mesh, {**stress_setting.parameters, "time_integration": "exact"}, {})
-    unit = _started(_MECHANICS[mechanics.kind], mesh, {**mechanics.parameters, "stabilization": 1.0}, directions)
+    stress = started(ActiveStress, mesh, {**stress_setting.parameters, "time_integration": "exact"}, {})
+    unit = started(_MECHANICS[mechanics.kind], mesh, {**mechanics.parameters, "stabilization": 1.0}, directions)
     stretch, change = unit.get("stretch"), np.inf
     rest, amplitude = _action_potential(coupled)
     for number in range(1, _MOST_STEPS + 1):
@@ -171,22 +170,9 @@ def _directions(coupled: Coupled, mesh: Mesh) -> dict[str, FloatArray]:
     generators = [unit for unit in coupled.units.values() if unit.kind == FiberGenerator.name]
     names = ("fiber", "sheet")
     if generators:
-        generator = _started(FiberGenerator, mesh, generators[0].parameters, {})
+        generator = started(FiberGenerator, mesh, generators[0].parameters, {})
         return {name: generator.get(name) for name in names}
     return {name: np.tile(np.asarray(Mechanics.variable(name).guess), (mesh.elements, 1)) for name in names}
-
-
-def _started(kind: type[Started], mesh: Mesh, parameters: Mapping[str, Any], inputs: Moment) -> Started:
-    """A unit after its initialisation, with those of `inputs` that it takes once."""
-    unit = kind(mesh)
-    unit.instantiate(parameters)
-    unit.setup_experiment()
-    unit.enter_initialization_mode()
-    for variable in kind.inputs():
-        if variable.fixed and variable.name in inputs:
-            unit.set(variable.name, inputs[variable.name])
-    unit.exit_initialization_mode()
-    return unit
 
 
 def _changing(kind: type[Unit]) -> set[str]:

@@ -15,19 +15,6 @@ from oscillator import Oscillator
 
 Mapped = Callable[..., StabilityMap]
 
-_SCENARIO = """\
-name: small_cell
-scene: {geometry: cell}
-units:
-  fibers: {unit: fiber_generator}
-  electrophysiology: {unit: electrophysiology, parameters: {time_scale_reduction: 0}}
-  active_stress: {unit: active_stress}
-  mechanics: {unit: local_mechanics}
-coupling: {step_ms: 1}
-run: {stop_ms: 40, participants: native}
-output: {every_ms: 20, probes_mm: {cell: [10, 0, 0]}}
-"""
-
 #: Which inputs are followed, against the step; a step of 3 ms does not divide the run.
 _STUDY = """\
 name: accuracy
@@ -43,9 +30,8 @@ lines:
 
 
 @pytest.fixture
-def cell_study(tmp_path: Path) -> Path:
+def cell_study(tmp_path: Path, small_cell: Path) -> Path:
     """A study of one cell with a categorical axis; the tolerance is to be set."""
-    (tmp_path / "small_cell.yaml").write_text(_SCENARIO)
     path = tmp_path / "accuracy.yaml"
     path.write_text(_STUDY.replace("LIMIT", "1.0"))
     return path
