@@ -27,7 +27,6 @@ from scipy.special import exprel
 
 from .arrays import FloatArray, frozen
 from .errors import StepFailure
-from .input_ramp import InputRamp
 from .mesh.averages import around_nodes
 from .snapshot import State
 from .unit import Unit
@@ -83,7 +82,8 @@ class ActiveStress(Unit):
     """Active stress by a potential-dependent first-order delay."""
 
     name = "active_stress"
-    groups = (Tension, InputRamp)
+    interpolates = True
+    groups = (Tension,)
     fields = (
         Variable("potential", Causality.INPUT, "mV", "transmembrane potential", Location.NODE, start=-80.0),
         Variable(

@@ -14,7 +14,7 @@ FIBER_INPUT = Variable(
     Location.ELEMENT,
     components=3,
     fixed=True,
-    guess=(1.0, 0.0, 0.0),
+    stand_in=(1.0, 0.0, 0.0),
 )
 SHEET_INPUT = Variable(
     "sheet",
@@ -24,7 +24,7 @@ SHEET_INPUT = Variable(
     Location.ELEMENT,
     components=3,
     fixed=True,
-    guess=(0.0, 1.0, 0.0),
+    stand_in=(0.0, 1.0, 0.0),
 )
 
 #: Deviation from a unit vector, or from a right angle, that is taken for rounding in another tool.

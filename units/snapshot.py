@@ -1,39 +1,50 @@
 """A unit's state, saved: to go back to it within a process, or as bytes in another one."""
 
 import io
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from .arrays import FloatArray, frozen
 from .errors import InvalidInput
+from .phase import Phase
+from .variable import Scalar
 
 State = Mapping[str, FloatArray]
 
-_FORMAT = 2
+_FORMAT = 3
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """All that a unit needs to go on from a moment, its parameters apart. The arrays are never changed in place.
+    """All that a unit needs to go on from a moment. The arrays are never changed in place.
 
-    `mesh` is the fingerprint of the mesh it belongs to; `begins` the inputs from which the next step's ramps start,
-    where the unit ramps them.
+    `mesh` is the fingerprint of the mesh it belongs to; `parameters` are those that differ from what is declared, or
+    were given all the same.
     """
 
     unit: str
     mesh: str
+    phase: Phase
+    parameters: Mapping[str, Scalar]
     inputs: State
     state: State
-    begins: State = field(default_factory=dict)
 
     def to_bytes(self) -> bytes:
         """The snapshot in NumPy's npz format, without pickled objects."""
         buffer = io.BytesIO()
-        groups = {"input": self.inputs, "state": self.state, "begin": self.begins}
+        groups = {"input": self.inputs, "state": self.state}
         arrays = {f"{group}/{name}": value for group, members in groups.items() for name, value in members.items()}
-        header = {"format": np.array(_FORMAT), "unit": np.array(self.unit), "mesh": np.array(self.mesh)}
+        header = {
+            "format": np.array(_FORMAT),
+            "unit": np.array(self.unit),
+            "mesh": np.array(self.mesh),
+            "phase": np.array(self.phase.name),
+            # Numbers as many digits as it takes to read the same ones back.
+            "parameters": np.array(json.dumps(dict(self.parameters))),
+        }
         np.savez(buffer, allow_pickle=False, **header, **arrays)
         return buffer.getvalue()
 
@@ -46,6 +57,7 @@ class Snapshot:
             if int(arrays.pop("format")) != _FORMAT:
                 raise ValueError("written by another version")
             unit, mesh = str(arrays.pop("unit")), str(arrays.pop("mesh"))
+            phase, parameters = Phase[str(arrays.pop("phase"))], json.loads(str(arrays.pop("parameters")))
         # NumPy's readers raise whatever the damaged bytes trip them over.
         except Exception as error:
             raise InvalidInput(f"the bytes are no serialized state of a unit ({error})") from error
@@ -53,4 +65,4 @@ class Snapshot:
         def group(prefix: str) -> dict[str, FloatArray]:
             return {key.removeprefix(prefix): frozen(value) for key, value in arrays.items() if key.startswith(prefix)}
 
-        return cls(unit, mesh, group("input/"), group("state/"), group("begin/"))
+        return cls(unit, mesh, phase, parameters, group("input/"), group("state/"))

@@ -3,7 +3,6 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from enum import Enum
 from functools import cache
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
@@ -12,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, frozen
 from .errors import CallOrderError, InvalidInput, StepFailure
-from .input_ramp import INPUT_INTERPOLATION
 from .mesh import Mesh
+from .phase import Phase
 from .snapshot import Snapshot, State
 from .statistics import Statistic, statistics
 from .variable import Causality, Location, Scalar, Variable, parameters_of
@@ -44,15 +43,6 @@ FALLBACKS = Variable(
 _FAR, _MOST_TOLD = 5.0, 3
 
 
-class Phase(Enum):
-    """Where a unit stands in its life (FMI 2.0.4, section 4.2.4)."""
-
-    INSTANTIATED = "instantiated"
-    INITIALIZATION = "in initialization mode"
-    STEPPING = "initialized"
-    TERMINATED = "terminated"
-
-
 @runtime_checkable
 class Placed(Protocol):
     """A group of parameters that name places, which a mesh may have elsewhere."""
@@ -77,15 +67,17 @@ class Unit(ABC):
     fields: ClassVar[tuple[Variable, ...]]
     #: Whether its outputs follow its inputs at the same time, whatever was before: a quasi-static equilibrium.
     memoryless: ClassVar[bool] = False
+    #: Whether inputs may run over a step, from the values set to those given for its end.
+    interpolates: ClassVar[bool] = False
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
         self.phase = Phase.INSTANTIATED
         self._parameters: dict[str, Scalar] = {}
         self._inputs: dict[str, FloatArray] = {}
-        # The inputs at the end of the last step, where they are ramped; else empty.
-        self._begins: dict[str, FloatArray] = {}
         self._state: dict[str, FloatArray] = {}
+        # The parameters and fixed inputs that `prepare` was called with last; None before.
+        self._prepared: tuple[dict[str, Scalar], dict[str, FloatArray]] | None = None
         # The state that the initialisation would end in as things are, if somebody wanted to know.
         self._foreseen: dict[str, FloatArray] | None = None
 
@@ -151,12 +143,12 @@ class Unit(ABC):
         self._require(Phase.INSTANTIATED)
         # Checked all before any is taken: a refused call changes nothing.
         checked = {name: self._parameter(name).checked(value) for name, value in parameters.items()}
-        self._parameters |= checked
+        self._parameters = self._parameters | checked
 
     def setup_experiment(self, start_time: float = 0.0, stop_time: float | None = None) -> None:
-        """Accept the experiment's times in s; the units' physics starts at 0."""
+        """Accept the experiment's times in s; the physics starts at 0, but for a unit without memory."""
         self._require(Phase.INSTANTIATED)
-        if start_time != 0.0:
+        if start_time != 0.0 and not self.memoryless:
             raise InvalidInput(f"unit '{self.name}' starts at t = 0 s, not at {start_time} s")
 
     def enter_initialization_mode(self) -> None:
@@ -180,30 +172,31 @@ class Unit(ABC):
         self._require(Phase.INITIALIZATION)
         self._foreseen = None
         with self._naming_parameters():
-            self.prepare()
+            self._prepare()
             self._state = self._sound(self.initial(self._inputs))
-        self._begins = dict(self._inputs) if self._ramps else {}
         self.phase = Phase.STEPPING
 
-    def do_step(self, time: float, step: float) -> None:
-        """Advance from `time` by `step` (both in s, step ≥ 0) with the inputs last set, held or ramped (`input_ramp`).
+    def do_step(self, time: float, step: float, ends: Mapping[str, ArrayLike] | None = None) -> None:
+        """Advance from `time` by `step` (both in s, step ≥ 0) with the inputs last set.
 
-        A step of 0 lets a memoryless unit follow its inputs and leaves the others as they are; a ramp of the next step
-        begins at the inputs of this one.
+        Inputs keep their values over the step, but for those in `ends`: where the unit interpolates its inputs, they
+        run linearly from the values set to those `ends`. After the step they are what was set, whatever they ran to. A
+        step of 0 lets a memoryless unit follow its inputs and leaves the others as they are.
 
         Raises
         ------
+        InvalidInput
+            For times that are no times, and for ends of inputs that cannot have them.
         StepFailure
             If the physics cannot be advanced; the state is then as before the call.
         """
         self._require(Phase.STEPPING)
         if not (np.isfinite(time) and np.isfinite(step) and step >= 0.0):
             raise InvalidInput(f"unit '{self.name}' cannot step from {time} s by {step} s: both finite, the step >= 0")
-        begin = self._begins or self._inputs
+        inputs = self._inputs | self._ends(ends) if ends else self._inputs
         with self._naming_parameters():
-            state = self.advance(self._state, begin, self._inputs, time * _MS_PER_S, step * _MS_PER_S)
+            state = self.advance(self._state, self._inputs, inputs, time * _MS_PER_S, step * _MS_PER_S)
             self._state = self._sound(state)
-        self._begins = dict(self._inputs) if self._ramps else {}
 
     def terminate(self) -> None:
         """End the life of the instance; only `get` and `reset` remain."""
@@ -215,7 +208,6 @@ class Unit(ABC):
         self.phase = Phase.INSTANTIATED
         self._parameters = {}
         self._inputs = {}
-        self._begins = {}
         self._state = {}
         self._foreseen = None
 
@@ -226,7 +218,8 @@ class Unit(ABC):
         variable = self.variable(name)
         if variable.causality is Causality.PARAMETER:
             self._require(Phase.INSTANTIATED, Phase.INITIALIZATION)
-            self._parameters[name] = variable.checked(value)
+            # A new one, since saved states hold the old.
+            self._parameters = self._parameters | {name: variable.checked(value)}
         elif variable.causality is Causality.INPUT:
             self._require(Phase.INSTANTIATED, Phase.INITIALIZATION, Phase.STEPPING)
             field = self._field(variable, value)
@@ -235,7 +228,7 @@ class Unit(ABC):
                 if not np.array_equal(field, self._inputs[name]):
                     raise CallOrderError(f"input '{name}' of unit '{self.name}' is fixed after initialisation")
                 return
-            self._inputs[name] = field
+            self._inputs = self._inputs | {name: field}
         else:
             raise InvalidInput(f"'{name}' is {variable.causality} of unit '{self.name}' and cannot be set")
         self._foreseen = None
@@ -244,8 +237,8 @@ class Unit(ABC):
         """A variable's value: read-only array of the declared shape, or the parameter's scalar.
 
         In initialization mode an output is what it would be if that ended now, which is where masters look for the
-        initial values of inputs (FMI 2.0.4, section 4.2.4); directions that were not given yet are guessed. What the
-        unit computes with is an empty text until it is initialised.
+        initial values of inputs (FMI 2.0.4, section 4.2.4). What the unit computes with is an empty text until it is
+        initialised.
 
         Raises
         ------
@@ -274,43 +267,49 @@ class Unit(ABC):
 
     def get_state(self) -> Snapshot:
         """All that `set_state` needs to return here exactly. Costs references only: no array is copied."""
-        self._require(Phase.STEPPING)
-        return Snapshot(
-            self.name, self.mesh.fingerprint, dict(self._inputs), dict(self._state), begins=dict(self._begins)
-        )
+        return Snapshot(self.name, self.mesh.fingerprint, self.phase, self._parameters, self._inputs, dict(self._state))
 
     def set_state(self, snapshot: Snapshot) -> None:
-        """Go back (or forth) to `snapshot`: the next step gives the same bits as it gave from there.
+        """Go back (or forth) to `snapshot`, in any phase: the next step gives the same bits as it gave from there.
+
+        Parameters and fixed inputs (fibres) are part of it; where they differ from the present ones the unit is
+        prepared anew, which takes as long as its initialisation.
 
         Raises
         ------
         InvalidInput
-            If the snapshot is of another unit, of another mesh, or made with other fixed inputs (fibres), from which
-            the unit's operators are built.
+            If the snapshot is of another unit or of another mesh; everything is then as before the call.
         """
-        self._require(Phase.STEPPING)
         if snapshot.unit != self.name:
             raise InvalidInput(f"a state of unit '{snapshot.unit}' was given to unit '{self.name}'")
         if snapshot.mesh != self.mesh.fingerprint:
             raise InvalidInput(f"the state given to unit '{self.name}' belongs to another mesh")
-        for kind, arrays, own in (
-            ("input", snapshot.inputs, self._inputs),
-            ("state", snapshot.state, self._state),
-            ("input ramp's", snapshot.begins, self._begins),
-        ):
-            if {name: value.shape for name, value in arrays.items()} != {name: own[name].shape for name in own}:
-                raise InvalidInput(f"the {kind} arrays of the state do not fit unit '{self.name}'")
-        for variable in self.inputs():
-            name = variable.name
-            fixed = variable.fixed and name in self._inputs
-            if fixed and not np.array_equal(snapshot.inputs[name], self._inputs[name]):
-                raise InvalidInput(
-                    f"the state given to unit '{self.name}' was made with another {name}; "
-                    "initialise the unit with the same one"
-                )
-        self._inputs = dict(snapshot.inputs)
-        self._begins = dict(snapshot.begins)
-        self._state = dict(snapshot.state)
+        declared = _declared(type(self))
+        inputs = {name: declared.get(name) for name in snapshot.inputs}
+        for name, variable in inputs.items():
+            if (
+                variable is None
+                or variable.causality is not Causality.INPUT
+                or snapshot.inputs[name].shape != variable.shape(self.mesh)
+            ):
+                raise InvalidInput(f"the input arrays of the state do not fit unit '{self.name}'")
+        parameters = {name: self._parameter(name).checked(value) for name, value in snapshot.parameters.items()}
+        if snapshot.state and self._state and parameters == self._parameters:
+            shapes = [{name: value.shape for name, value in state.items()} for state in (snapshot.state, self._state)]
+            if shapes[0] != shapes[1]:
+                raise InvalidInput(f"the state arrays of the state do not fit unit '{self.name}'")
+        before = self.phase, self._parameters, self._inputs, self._state
+        self._parameters, self._inputs = parameters, dict(snapshot.inputs)
+        if snapshot.phase in (Phase.STEPPING, Phase.TERMINATED) and not self._is_prepared():
+            try:
+                with self._naming_parameters():
+                    self._prepare()
+            except BaseException:
+                self.phase, self._parameters, self._inputs, self._state = before
+                if self.phase in (Phase.STEPPING, Phase.TERMINATED):
+                    self._prepare()
+                raise
+        self.phase, self._state, self._foreseen = snapshot.phase, dict(snapshot.state), None
 
     serialize = staticmethod(Snapshot.to_bytes)
     deserialize = staticmethod(Snapshot.from_bytes)
@@ -327,7 +326,10 @@ class Unit(ABC):
 
     @abstractmethod
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
-        """The state one `step` (ms) after `time` (ms); inputs run linearly from `begin`, or are held, both the same."""
+        """The state one `step` (ms) after `time` (ms).
+
+        Inputs run linearly from `begin` to `inputs`; where they are held, the two are one object.
+        """
 
     @abstractmethod
     def output(self, name: str, state: State) -> FloatArray:
@@ -338,26 +340,42 @@ class Unit(ABC):
             return ""
         return self.implementation() if variable is IMPLEMENTATION else "\n".join(self.fallbacks())
 
-    @property
-    def _ramps(self) -> bool:
-        return INPUT_INTERPOLATION in _declared(type(self)) and self.get(INPUT_INTERPOLATION) == "linear"
+    def _prepare(self) -> None:
+        """`prepare`, with what it is called with kept."""
+        self._prepared = None
+        self.prepare()
+        self._prepared = self._parameters, self._fixed_inputs()
+
+    def _is_prepared(self) -> bool:
+        """Whether `prepare` was called with the present parameters and fixed inputs."""
+        if self._prepared is None:
+            return False
+        parameters, fixed = self._prepared
+        defaults = {name: self.variable(name).start for name in (*parameters, *self._parameters)}
+        own = self._fixed_inputs()
+        return defaults | parameters == defaults | self._parameters and all(
+            fixed[name] is own[name] or np.array_equal(fixed[name], own[name]) for name in own
+        )
+
+    def _fixed_inputs(self) -> dict[str, FloatArray]:
+        return {item.name: self._inputs[item.name] for item in self.inputs() if item.fixed}
+
+    def _ends(self, ends: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
+        """`ends` as arrays; InvalidInput for one that the unit cannot have."""
+        checked = {}
+        for name, value in ends.items():
+            variable = self.variable(name)
+            if not self.interpolates or variable.causality is not Causality.INPUT or variable.fixed:
+                raise InvalidInput(f"'{name}' of unit '{self.name}' keeps its value over a step; it has no other end")
+            checked[name] = self._field(variable, value)
+        return checked
 
     def _foresee(self) -> State:
         """The state in which the initialisation would end; kept until something is set."""
         if self._foreseen is None:
-            given = self._inputs
-            guesses = [variable for variable in self.inputs() if variable.guess]
-            if any(np.array_equal(given[variable.name], self._default(variable)) for variable in guesses):
-                shapes = {variable: variable.shape(self.mesh) for variable in guesses}
-                self._inputs = given | {
-                    variable.name: frozen(np.broadcast_to(variable.guess, shape)) for variable, shape in shapes.items()
-                }
-            try:
-                with self._naming_parameters():
-                    self.prepare()
-                    self._foreseen = self._sound(self.initial(self._inputs))
-            finally:
-                self._inputs = given
+            with self._naming_parameters():
+                self._prepare()
+                self._foreseen = self._sound(self.initial(self._inputs))
         return self._foreseen
 
     @contextmanager
@@ -410,7 +428,7 @@ class Unit(ABC):
             )
 
     def _default(self, variable: Variable) -> FloatArray:
-        return frozen(np.full(variable.shape(self.mesh), variable.start))
+        return frozen(np.full(variable.shape(self.mesh), variable.stand_in or variable.start))
 
     def _field(self, variable: Variable, value: ArrayLike | str) -> FloatArray:
         try:

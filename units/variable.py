@@ -63,7 +63,7 @@ class Variable:
     `unit` is the unit of measure ("mV"; "1" for a pure number). `depends_on` names the inputs that an output follows;
     `pointwise` says that its value at a place follows those inputs at this place only. `fixed` variables keep their
     value after initialisation. `needs` names a parameter that must differ from zero for the input or output to matter.
-    `guess`, by component, stands in for a fixed input that has no sensible default, for as long as it is not given.
+    `stand_in`, by component, is what an input starts with that has no sensible value, until somebody gives one.
     `missing` is the value at places that have none yet; `mean_record` says of a field what `record` says of its mean.
     `refines` says of a number that it decides the unit's numerical error, and how; it needs a lower limit.
     """
@@ -76,7 +76,7 @@ class Variable:
     components: int = 1
     start: Scalar = 0.0
     fixed: bool = False
-    guess: tuple[float, ...] = ()
+    stand_in: tuple[float, ...] = ()
     depends_on: tuple[str, ...] = ()
     pointwise: bool = False
     needs: str | None = None

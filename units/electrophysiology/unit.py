@@ -32,7 +32,6 @@ from .. import kernels
 from ..arrays import FloatArray, frozen
 from ..directions import FIBER_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
-from ..input_ramp import InputRamp
 from ..mesh.refinement import check_levels, refined
 from ..snapshot import State
 from ..unit import Unit
@@ -108,6 +107,7 @@ class Electrophysiology(Unit):
     """Monodomain with stretch-activated current on linear elements."""
 
     name = "electrophysiology"
+    interpolates = True
     groups = (
         PotentialScale,
         Resolution,
@@ -117,7 +117,6 @@ class Electrophysiology(Unit):
         TimeScale,
         Stimulus,
         Probes,
-        InputRamp,
     )
     fields = (
         Variable(

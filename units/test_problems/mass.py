@@ -20,7 +20,6 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..arrays import FloatArray
-from ..input_ramp import InputRamp
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Record, Variable, parameter
@@ -63,7 +62,8 @@ class Mass(Unit):
     """A damped mass on a spring, coupled to another through a spring and a damper."""
 
     name = "mass"
-    groups = (Suspension, Release, InputRamp)
+    interpolates = True
+    groups = (Suspension, Release)
     fields = (
         Variable("F_in", Causality.INPUT, "1", "force on the mass"),
         Variable("x_in", Causality.INPUT, "1", "displacement at the other end of the coupling"),

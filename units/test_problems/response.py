@@ -19,7 +19,6 @@ import numpy as np
 from scipy.special import exprel
 
 from ..arrays import FloatArray
-from ..input_ramp import InputRamp
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Record, Variable, parameter
@@ -53,7 +52,8 @@ class Response(Unit):
     """A number that follows another: at once, with a delay, or its rate."""
 
     name = "response"
-    groups = (Law, InputRamp)
+    interpolates = True
+    groups = (Law,)
     fields = (
         Variable("u", Causality.INPUT, "1", "the number that is followed"),
         Variable("y", Causality.OUTPUT, "1", "the answer", depends_on=("u",), record=Record.VALUE),
@@ -75,7 +75,7 @@ class Response(Unit):
         if step == 0.0:
             return {**state, "delayed": delayed}
         # A held input has jumped to where it is since the last step; a ramped one comes from where its ramp begins.
-        first = begin["u"] if self._ramps else state["last"]
+        first = state["last"] if begin is inputs else begin["u"]
         return {"delayed": delayed, "rate_per_ms": np.asarray((last - first) / step), "last": last.copy()}
 
     def output(self, name: str, state: State) -> FloatArray:

@@ -1,0 +1,12 @@
+"""Where a unit stands in its life."""
+
+from enum import Enum
+
+
+class Phase(Enum):
+    """The phases, in their order (FMI 2.0.4, section 4.2.4); the value is for a person."""
+
+    INSTANTIATED = "instantiated"
+    INITIALIZATION = "in initialization mode"
+    STEPPING = "initialized"
+    TERMINATED = "terminated"
