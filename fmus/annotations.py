@@ -7,6 +7,8 @@ The element `Unit` stands under VendorAnnotations in FMI 2.0 (FMI 2.0.4, section
 from collections.abc import Iterator
 
 from ..units.statistics import Statistic
+from ..units.unit import FALLBACKS as _FALLBACKS
+from ..units.unit import IMPLEMENTATION as _IMPLEMENTATION
 from ..units.unit import Unit
 from ..units.variable import Causality, Record
 from .xml_tag import tag
@@ -14,24 +16,33 @@ from .xml_tag import tag
 #: Name under which the annotations stand.
 TOOL = "cardiac-cosim"
 
+#: Namespace of the elements, so that nobody takes them for elements of FMI.
+NAMESPACE = f"urn:{TOOL}:fmu"
+
+#: The variables in which an FMU says what it computes with.
+IMPLEMENTATION, FALLBACKS = _IMPLEMENTATION.name, _FALLBACKS.name
+
 
 def annotations(unit: type[Unit]) -> Iterator[str]:
     """The lines of the element `Unit`, with a `Field` for each input and output."""
-    yield tag("Unit", name=unit.name, memoryless=str(unit.memoryless).lower())
+    attributes = {"xmlns:own": NAMESPACE, "name": unit.name, "memoryless": str(unit.memoryless).lower()}
+    yield tag("own:Unit", end=False, **attributes)
     for variable in unit.variables():
         if variable.causality not in (Causality.INPUT, Causality.OUTPUT):
             continue
         extra = {"needs": variable.needs} if variable.needs else {}
         if variable.record is not Record.NOTHING:
             extra["record"] = variable.record.value
+        if variable.stand_in:
+            extra["standIn"] = "true"
         if isinstance(variable, Statistic):
             extra["of"] = variable.source.name
         yield tag(
-            "Field",
+            "own:Field",
             name=variable.name,
             location=variable.location.value,
             fixed=str(variable.fixed).lower(),
             **extra,
             end=True,
         )
-    yield "</Unit>"
+    yield "</own:Unit>"

@@ -1,14 +1,13 @@
-"""Building FMUs: a unit and a mesh in, a self-contained FMI 2.0 co-simulation FMU out.
+"""Building FMUs: a unit and a mesh in, a self-contained co-simulation FMU of FMI 2.0 or 3.0 out.
 
 The FMU carries the code of the units and loads it under a private name that holds a hash of it, so that two FMUs of
-different versions in one process never run each other's code. Its binary is this project's own wrapper (`wrapper`),
-or pythonfmu's where that could not be compiled. The archive is compressed.
+different versions in one process never run each other's code. Its binaries are this project's own wrapper (`wrapper`),
+for every platform that it was compiled for. The archive is compressed.
 """
 
 import hashlib
 import tempfile
 import uuid
-from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -17,18 +16,25 @@ from ..units import registry
 from ..units.mesh import Mesh
 from ..units.mesh.archive import pack_mesh
 from ..units.unit import Unit
-from . import wrapper
+from .annotations import TOOL
 from .archive import write_archive
+from .binaries import binaries
+from .description import model_description
 from .instance import MESH_FILE
-from .missing_package import MISSING_PACKAGE
-from .model_description import TOOL, model_description
-from .pythonfmu_build import pythonfmu_archive
 
 #: What an FMU carries of this floor; the units' floor goes whole, but for the geometries (the mesh is in the FMU).
-_OWN_FILES = ("__init__.py", "instance.py", "layout.py", "messages.py", "slave.py")
-#: And what it needs besides where its binary is pythonfmu's.
-_PYTHONFMU_FILE = "pythonfmu_slave.py"
+_OWN_FILES = (
+    "__init__.py",
+    "clock.py",
+    "instance.py",
+    "layout.py",
+    "messages.py",
+    "references.py",
+    "saved_state.py",
+    "slave.py",
+)
 
+#: load.py of the resources, which the binary runs.
 _LOADER = '''"""Loads the packaged code under a name that is its own."""
 
 import importlib.util
@@ -38,9 +44,9 @@ from pathlib import Path
 PACKAGE = "{package}"
 
 
-def instantiate(resources, guid):
-    if guid != "{guid}":
-        raise ValueError("the GUID " + guid + " is not that of this FMU; take its modelDescription.xml along with it")
+def instantiate(resources, token, fmi):
+    if token != "{token}":
+        raise ValueError("the GUID " + token + " is not that of this FMU; take its modelDescription.xml along with it")
     try:
         if PACKAGE not in sys.modules:
             folder = Path(resources) / PACKAGE
@@ -51,36 +57,37 @@ def instantiate(resources, guid):
         slave = importlib.import_module(PACKAGE + ".fmus.slave")
     except ModuleNotFoundError as error:
         del sys.modules[PACKAGE]
-        {missing}
-    return slave.Slave("{unit}", resources)
+        raise ImportError(
+            "this FMU needs the Python package '" + str(error.name).partition(".")[0] + "', which the Python "
+            + sys.version.split()[0] + " at " + sys.prefix + " does not have; install numpy, scipy, scikit-fem and "
+            "meshio there; hosts without a Python of their own take that of the environment variable COSIM_PYTHON"
+        ) from None
+    return slave.Slave("{unit}", resources, fmi)
 '''
 
 
-def sources() -> dict[str, bytes]:
-    """The code an FMU carries, by its path in the package."""
-    # Code that differs in as little as this has another hash, and is never taken for the other.
-    return _read(_OWN_FILES if wrapper.library() is not None else (*_OWN_FILES, _PYTHONFMU_FILE))
-
-
 @cache
-def _read(names: tuple[str, ...]) -> dict[str, bytes]:
-    """The units' code and the files `names` of this floor; read once in a process, which runs no other."""
+def sources() -> dict[str, bytes]:
+    """The code an FMU carries, by its path in the package; read once in a process, which runs no other."""
     own = Path(__file__).parent
     floor = Path(registry.__file__).parent
     # Kernels that were compiled when the package was built go along; an FMU without them falls back to NumPy.
     files_there = (path for path in floor.rglob("*") if path.suffix in (".py", ".so"))
     modules = sorted(path.relative_to(floor) for path in files_there)
     files = {f"units/{path.as_posix()}": (floor / path).read_bytes() for path in modules if path.parts[0] != "geometry"}
-    files |= {f"fmus/{name}": (own / name).read_bytes() for name in names}
+    files |= {f"fmus/{name}": (own / name).read_bytes() for name in _OWN_FILES}
     return files | {"__init__.py": b'"""Units and slave, packaged."""\n'}
 
 
-def fingerprint(unit: type[Unit], mesh: Mesh) -> str:
+def fingerprint(unit: type[Unit], mesh: Mesh, fmi: int = 2) -> str:
     """A hash of all that decides what the FMU of `unit` on `mesh` holds."""
-    library = wrapper.library()
-    binary = f"pythonfmu {version('pythonfmu')}".encode() if library is None else library.read_bytes()
-    head = f"{unit.name} {version(TOOL)}".encode() + binary
-    return content_hash(head, Path(__file__).parent.glob("*.py"), sources(), mesh)
+    digest = hashlib.sha256(f"FMI {fmi} {unit.name} {version(TOOL)} {mesh.fingerprint}".encode())
+    # Code that differs in as little as this has another hash, and is never taken for the other.
+    own = Path(__file__).parent
+    builders = {str(path.relative_to(own)): path.read_bytes() for path in sorted(own.rglob("*.py"))}
+    for name, content in (builders | sources() | binaries(unit.name, fmi)).items():
+        digest.update(f"{name} {len(content)} ".encode() + content)
+    return digest.hexdigest()
 
 
 def guid_of(key: str) -> str:
@@ -88,45 +95,28 @@ def guid_of(key: str) -> str:
     return f"{{{uuid.uuid5(uuid.NAMESPACE_OID, key)}}}"
 
 
-def content_hash(head: bytes, builders: Iterable[Path], files: dict[str, bytes], mesh: Mesh) -> str:
-    """A hash of `head`, of the code that builds an FMU, and of the code and the mesh that it carries."""
-    digest = hashlib.sha256(head)
-    for path in sorted(builders):
-        digest.update(path.read_bytes())
-    for name, content in files.items():
-        digest.update(name.encode() + content)
-    digest.update(mesh.fingerprint.encode())
-    return digest.hexdigest()
-
-
-def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path) -> Path:
-    """Write the FMU of `unit` on `mesh` to the file `destination` and return it."""
-    key = fingerprint(unit, mesh)
-    guid = guid_of(key)
-    package, code = package_of(sources())
+def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path, fmi: int = 2) -> Path:
+    """Write the FMU of `unit` on `mesh`, of FMI 2.0 or (`fmi` is 3) 3.0, to the file `destination` and return it."""
+    token = guid_of(fingerprint(unit, mesh, fmi))
+    package, code = _package()
     with tempfile.TemporaryDirectory(prefix="cosim-build-") as folder:
-        work = Path(folder)
-        pack_mesh(mesh, work / MESH_FILE)
-        library = wrapper.library()
-        if library is None:
-            members = pythonfmu_archive(unit, key, package, code, work)
-            tool = f"{TOOL} {version(TOOL)} with PythonFMU {version('pythonfmu')}"
-        else:
-            loader = _LOADER.format(unit=unit.name, package=package, guid=guid, missing=MISSING_PACKAGE)
-            members = {f"resources/{name}": content for name, content in code.items()}
-            members |= {"resources/load.py": loader.encode()}
-            members |= {f"resources/{MESH_FILE}": (work / MESH_FILE).read_bytes()}
-            members |= {f"binaries/linux64/{unit.name}.so": library.read_bytes()}
-            tool = f"{TOOL} {version(TOOL)}"
-        members["modelDescription.xml"] = model_description(unit, mesh, guid, tool).encode()
+        packed = Path(folder) / MESH_FILE
+        pack_mesh(mesh, packed)
+        members = {f"resources/{name}": content for name, content in code.items()}
+        members |= {
+            "modelDescription.xml": model_description(unit, mesh, token, fmi).encode(),
+            "resources/load.py": _LOADER.format(unit=unit.name, package=package, token=token).encode(),
+            f"resources/{MESH_FILE}": packed.read_bytes(),
+        }
+        members |= binaries(unit.name, fmi)
     write_archive(members, destination)
     return destination
 
 
-def package_of(files: dict[str, bytes]) -> tuple[str, dict[str, bytes]]:
-    """A name that holds a hash of the code `files`, and the files with their paths below it."""
+def _package() -> tuple[str, dict[str, bytes]]:
+    """A name that holds a hash of the code, and the code with its paths below it."""
     digest = hashlib.sha256()
-    for name, content in files.items():
+    for name, content in sources().items():
         digest.update(f"{name} {len(content)} ".encode() + content)
     package = f"cosim_{digest.hexdigest()[:16]}"
-    return package, {f"{package}/{name}": content for name, content in files.items()}
+    return package, {f"{package}/{name}": content for name, content in sources().items()}

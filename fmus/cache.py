@@ -12,8 +12,6 @@ from ..units.mesh import Mesh
 from ..units.unit import Unit
 from .archive import put_in_place
 from .build import build_fmu, fingerprint, guid_of
-from .fmi3.build import build_fmu as build_fmi3
-from .fmi3.build import fingerprint as fingerprint_fmi3
 
 #: Bytes of a model description in which the root element's attributes stand.
 _HEAD = 1000
@@ -31,9 +29,9 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
     root = folder if folder is not None else user_cache() / "fmus"
     if fmi not in (2, 3):
         raise ValueError(f"there are FMUs of FMI 2 and 3, not {fmi}")
-    key, build = (fingerprint(unit, mesh), build_fmu) if fmi == 2 else (fingerprint_fmi3(unit, mesh), build_fmi3)
+    key = fingerprint(unit, mesh, fmi)
     path = root / key[:16] / f"{unit.name}.fmu"
-    return path if _holds(path, guid_of(key)) else build(unit, mesh, path)
+    return path if _holds(path, guid_of(key)) else build_fmu(unit, mesh, path, fmi)
 
 
 def user_cache() -> Path:

@@ -1,21 +1,25 @@
 """A unit as an instance of its FMU: FMI's calls with value references, in NumPy arrays; what is wrong is raised.
 
-What a wrapper makes of exceptions is said in `slave` (this project's own wrapper) and in `pythonfmu_slave`.
+What the wrapper makes of exceptions is said in `slave`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from ..units.arrays import FloatArray
 from ..units.errors import InvalidInput, StepFailure
 from ..units.mesh.archive import unpack_mesh
+from ..units.phase import Phase
 from ..units.registry import UNITS
-from ..units.snapshot import Snapshot
-from ..units.unit import Phase
 from ..units.variable import Causality
-from .layout import Run, layout
+from .clock import Clock
+from .layout import TIME, Run, layout
+from .references import ArrayReferences, Piece, References, ScalarReferences
+from .saved_state import SavedState
 
 MESH_FILE = "mesh.npz"
 
@@ -23,128 +27,280 @@ _Result = TypeVar("_Result")
 
 
 class UnitInstance:
-    """The unit `name` on the mesh in the folder `resources`.
+    """The unit `name` on the mesh in the folder `resources`, in the version `fmi` of the standard, 2 or 3.
 
-    Whole fields move in one piece. Inputs that are set scalar by scalar are collected, and given to the unit before it
-    needs them. All methods raise InvalidInput for what the caller got wrong.
+    Whole fields move in one piece. Inputs that are set in parts are collected, and given to the unit before it needs
+    them. All methods raise InvalidInput for what the caller got wrong, and nothing has changed then.
     """
 
-    def __init__(self, name: str, resources: str) -> None:
+    def __init__(self, name: str, resources: str, fmi: int) -> None:
         mesh = unpack_mesh(Path(resources) / MESH_FILE)
         self.unit = UNITS[name](mesh)
-        self._runs = layout(type(self.unit), mesh)
-        self._firsts = np.array([run.first for run in self._runs])
-        self._whole = {(run.first, run.size): run for run in self._runs}
-        # Compared with at every call: in the type in which they come, and made once.
-        self._references = {key: np.arange(key[0], sum(key), dtype=np.uint32) for key in self._whole}
-        self._staged: dict[str, np.ndarray] = {}
-        self._read: dict[str, np.ndarray] = {}
+        self.clock = Clock()
+        self._fmi = fmi
+        kind = ScalarReferences if fmi == 2 else ArrayReferences
+        self._references: References = kind(name, layout(type(self.unit), mesh))
+        self._staged: dict[str, FloatArray] = {}
+        self._read: dict[str, FloatArray] = {}
+        # For the next step: time derivatives of inputs in 1/s (FMI 2.0), or their values at its end (FMI 3.0).
+        self._derivatives: dict[str, FloatArray] = {}
+        self._ends: dict[str, FloatArray] = {}
 
     # --- life cycle ---------------------------------------------------------------------------------------------------
 
+    def setup_experiment(self, start: float, stop: float) -> None:
+        """fmi2SetupExperiment; times in s, and a stop time that is not defined is infinite."""
+        clock = Clock(start, stop)
+        self.unit.setup_experiment(start, None if stop == inf else stop)
+        self.clock = clock
+
+    def enter_initialization_mode(self) -> None:
+        """fmi2EnterInitializationMode and fmi3EnterInitializationMode."""
+        self._advance(self.unit.enter_initialization_mode)
+
     def exit_initialization_mode(self) -> None:
-        """fmi2ExitInitializationMode."""
+        """fmi2ExitInitializationMode and fmi3ExitInitializationMode."""
         self._advance(self.unit.exit_initialization_mode)
 
-    def flush(self) -> None:
-        """Give the unit the inputs that were set scalar by scalar."""
-        while self._staged:
-            name, values = self._staged.popitem()
-            self.unit.set(name, values.reshape(self.unit.variable(name).shape(self.unit.mesh)))
+    def check_step(self, time: float, size: float) -> None:
+        """InvalidInput for a step that FMI does not allow at present."""
+        if self.unit.phase is Phase.STEPPING:
+            self.clock.check(time, size)
+        else:
+            raise InvalidInput(
+                f"unit '{self.unit.name}' is {self.unit.phase.value}; it steps between the end of its initialization "
+                "and its termination only"
+            )
 
-    def do_step(self, time: float, step: float) -> None:
-        """fmi2DoStep; StepFailure leaves the state as it was."""
-        self._advance(lambda: self.unit.do_step(time, step))
+    def do_step(self, time: float, size: float) -> None:
+        """fmi2DoStep and fmi3DoStep; StepFailure leaves the state as it was."""
+        self.check_step(time, size)
+        ends, self._ends = self._ends, {}
+        for name, derivative in self._derivatives.items():
+            ends[name] = self._current(name) + size * derivative.reshape(self._shape(name))
+        self._advance(lambda: self.unit.do_step(time, size, ends))
+        self._derivatives = {}
+        self.clock = Clock(time + size, max(self.clock.stop, time + size))
+
+    def terminate(self) -> None:
+        """fmi2Terminate and fmi3Terminate."""
+        self.unit.terminate()
 
     def reset(self) -> None:
-        """fmi2Reset."""
-        self._staged.clear()
-        self._read.clear()
+        """fmi2Reset and fmi3Reset."""
+        self._forget()
+        self.clock = Clock()
         self.unit.reset()
 
     # --- values -------------------------------------------------------------------------------------------------------
 
-    def set_reals(self, references: np.ndarray, values: np.ndarray) -> None:
-        """fmi2SetReal; the arrays, shape (n,), are the caller's and are copied."""
-        self._forget_foreseen()
-        run = self._whole_run(references)
-        if run is not None:
-            self._expect(run, int(references[0]), "Real")
-            self._staged.pop(run.variable.name, None)
-            self._read.pop(run.variable.name, None)
-            whole = float(values[0]) if not run.shape else np.array(values).reshape(run.shape)
-            self.unit.set(run.variable.name, whole)
-            return
-        for reference, value in zip(references.tolist(), values.tolist(), strict=True):
-            run = self._run(reference, "Real")
-            if run.variable.causality is Causality.PARAMETER:
-                self._read.pop(run.variable.name, None)
-                self.unit.set(run.variable.name, value)
-            else:
-                self._stage(run)[reference - run.first] = value
+    def set_numbers(self, fmi_type: str, references: np.ndarray, values: np.ndarray) -> None:
+        """fmi2SetReal, fmi3SetFloat64 and so on; the arrays, shapes (references,) and (values,), are the caller's.
 
-    def get_reals(self, references: np.ndarray) -> tuple[np.ndarray, list[str]]:
-        """fmi2GetReal: values, shape (n,), not to be written to, and warnings of values that there are not yet."""
-        self.flush()
+        Of a call that is refused nothing is taken.
+        """
+        pieces = self._pieces(fmi_type, references, len(values))
+        for piece in pieces:
+            variable = self.unit.settable(piece.run.variable.name)
+            if variable.causality is Causality.PARAMETER:
+                variable.checked(values[piece.at].tolist()[0])
+            else:
+                self._check_input(piece, values[piece.at])
+        for piece in pieces:
+            self._take(piece, values[piece.at])
+
+    def get_numbers(self, fmi_type: str, references: np.ndarray, count: int) -> tuple[np.ndarray, list[str]]:
+        """fmi2GetReal, fmi3GetFloat64 and so on: `count` values, and warnings of those that there are not yet."""
+        pieces = self._pieces(fmi_type, references, count)
+        self._flush()
         warnings: list[str] = []
-        run = self._whole_run(references)
-        if run is not None:
-            self._expect(run, int(references[0]), "Real")
-            return self._values(run, warnings), warnings
-        values = np.empty(len(references))
-        owner = np.searchsorted(self._firsts, references, side="right") - 1
-        for number in np.unique(owner):
-            run = self._run(int(references[owner == number].max()), "Real")
-            values[owner == number] = self._values(run, warnings)[references[owner == number] - run.first]
+        if len(pieces) == 1 and pieces[0].places is None:
+            return self._values(pieces[0].run, warnings), warnings
+        values = np.empty(count)
+        for piece in pieces:
+            own = self._values(piece.run, warnings)
+            values[piece.at] = own if piece.places is None else own[piece.places]
         return values, warnings
 
-    def set_scalars(self, fmi_type: str, references: Sequence[int], values: Sequence[Any]) -> None:
-        """fmi2SetInteger, fmi2SetBoolean and fmi2SetString: parameters only."""
+    def set_texts(self, references: np.ndarray, values: Sequence[str]) -> None:
+        """fmi2SetString and fmi3SetString: parameters that choose between named options."""
+        chosen = dict(zip(self._texts(references), values, strict=True))
+        for name, value in chosen.items():
+            self.unit.settable(name).checked(value)
         self._forget_foreseen()
-        for reference, value in zip(references, values, strict=True):
-            run = self._run(reference, fmi_type)
-            self.unit.set(run.variable.name, value)
+        for name, value in chosen.items():
+            self.unit.set(name, value)
 
-    def get_scalars(self, fmi_type: str, references: Sequence[int]) -> list[Any]:
-        """fmi2GetInteger, fmi2GetBoolean and fmi2GetString."""
-        return [self.unit.get(self._run(reference, fmi_type).variable.name) for reference in references]
+    def get_texts(self, references: np.ndarray) -> list[str]:
+        """fmi2GetString and fmi3GetString."""
+        return [str(self.unit.get(name)) for name in self._texts(references)]
+
+    def refuse_type(self, fmi_type: str, references: np.ndarray) -> None:
+        """InvalidInput for a type that no unit has, with the one that the first variable is of."""
+        self._pieces(fmi_type, references, None)
+        raise InvalidInput(f"unit '{self.unit.name}' has no variables of the type {fmi_type}")
+
+    # --- inputs inside a step -----------------------------------------------------------------------------------------
+
+    def set_derivatives(self, references: np.ndarray, orders: np.ndarray, values: np.ndarray) -> None:
+        """fmi2SetRealInputDerivatives, of order 1 and per s; they hold for the next step that is completed."""
+        self._require_interpolation("canInterpolateInputs")
+        if (orders != 1).any():
+            raise InvalidInput(
+                f"unit '{self.unit.name}' takes the first time derivatives of its inputs, not those of order "
+                f"{orders[orders != 1][0]}"
+            )
+        pieces = self._pieces("Real", references, len(values))
+        for piece in pieces:
+            variable = self._moving(piece.run)
+            if not np.isfinite(values[piece.at]).all():
+                raise InvalidInput(f"the time derivative of '{variable.name}' is not finite")
+        for piece in pieces:
+            whole = self._derivatives.get(piece.run.variable.name, np.zeros(piece.run.size)).copy()
+            whole[slice(None) if piece.places is None else piece.places] = values[piece.at]
+            self._derivatives = self._derivatives | {piece.run.variable.name: whole}
+
+    def set_at_end(self, references: np.ndarray, values: np.ndarray) -> None:
+        """fmi3SetFloat64 in an intermediate update: values of inputs at the end of the step that is being done."""
+        self._require_interpolation("providesIntermediateUpdate")
+        pieces = self._pieces("Float64", references, len(values))
+        for piece in pieces:
+            self._moving(piece.run)
+            self._check_input(piece, values[piece.at])
+        for piece in pieces:
+            self._ends[piece.run.variable.name] = np.array(values[piece.at]).reshape(piece.run.shape)
+
+    # --- derivatives of outputs by inputs -----------------------------------------------------------------------------
+
+    def directional_derivative(
+        self, unknowns: np.ndarray, knowns: np.ndarray, seed: np.ndarray, count: int
+    ) -> np.ndarray:
+        """fmi2GetDirectionalDerivative and fmi3GetDirectionalDerivative: `count` changes of `unknowns` along `seed`."""
+        return self._product(self.unit.directional_derivative, knowns, seed, unknowns, count)
+
+    def adjoint_derivative(self, unknowns: np.ndarray, knowns: np.ndarray, seed: np.ndarray, count: int) -> np.ndarray:
+        """fmi3GetAdjointDerivative: `count` gradients by `knowns` of the unknowns weighted with `seed`."""
+        return self._product(self.unit.adjoint_derivative, unknowns, seed, knowns, count)
+
+    def _product(
+        self,
+        product: Callable[[Mapping[str, FloatArray]], Mapping[str, FloatArray]],
+        given: np.ndarray,
+        seed: np.ndarray,
+        wanted: np.ndarray,
+        count: int,
+    ) -> np.ndarray:
+        real = "Real" if self._fmi == 2 else "Float64"
+        sources, targets = self._pieces(real, given, len(seed)), self._pieces(real, wanted, count)
+        self._flush()
+        seeds: dict[str, FloatArray] = {}
+        for piece in sources:
+            whole = seeds.setdefault(piece.run.variable.name, np.zeros(piece.run.size))
+            whole[slice(None) if piece.places is None else piece.places] += seed[piece.at]
+        shaped = {name: values.reshape(self._shape(name)) for name, values in seeds.items()}
+        found, result = product(shaped), np.empty(count)
+        for piece in targets:
+            name = piece.run.variable.name
+            if name not in found:
+                raise InvalidInput(f"unit '{self.unit.name}' has no derivative of or by '{name}'")
+            own = np.asarray(found[name]).reshape(-1)
+            result[piece.at] = own if piece.places is None else own[piece.places]
+        return result
 
     # --- state --------------------------------------------------------------------------------------------------------
 
-    def get_state(self) -> Snapshot:
-        """fmi2GetFMUstate."""
-        return self._advance(self.unit.get_state)
+    def get_state(self) -> SavedState:
+        """fmi2GetFMUstate and fmi3GetFMUState: parameters and inputs are part of it."""
+        self._flush()
+        return SavedState(self.unit.get_state(), self.clock, self._derivatives)
 
-    def set_state(self, state: Snapshot | None) -> None:
-        """fmi2SetFMUstate; the state holds every input as well."""
-        self._read.clear()
-        if state is None:
-            raise InvalidInput("the state given to fmi2SetFMUstate is none of this FMU")
-        self._staged.clear()
-        self.unit.set_state(state)
+    def set_state(self, state: object) -> None:
+        """fmi2SetFMUstate and fmi3SetFMUState."""
+        if not isinstance(state, SavedState):
+            raise InvalidInput("the state that was given is none of this FMU")
+        self.unit.set_state(state.snapshot)
+        self._forget()
+        self.clock, self._derivatives = state.clock, dict(state.derivatives)
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
+    def _pieces(self, fmi_type: str, references: np.ndarray, count: int | None) -> Sequence[Piece]:
+        """What `references` mean; all have to be of the type that the caller took them for."""
+        pieces = self._references.pieces(references, count)
+        for piece in pieces:
+            own = piece.run.type_in(self._fmi)
+            if own != fmi_type:
+                raise InvalidInput(f"'{piece.run.variable.name}' is of the type {own}, not {fmi_type}")
+        return pieces
+
+    def _require_interpolation(self, capability: str) -> None:
+        if not self.unit.interpolates:
+            raise InvalidInput(f"unit '{self.unit.name}' keeps its inputs over a step ({capability} is false)")
+
+    def _moving(self, run: Run) -> Any:
+        """The variable of `run`, if it is an input that may change inside a step."""
+        variable = self.unit.settable(run.variable.name)
+        if variable.causality is not Causality.INPUT or variable.fixed:
+            raise InvalidInput(f"'{variable.name}' of unit '{self.unit.name}' does not change inside a step")
+        return variable
+
+    def _check_input(self, piece: Piece, values: np.ndarray) -> None:
+        variable = piece.run.variable
+        self.unit.check_values(variable, values, piece.places)
+        if variable.fixed and self.unit.phase is Phase.STEPPING and piece.places is not None:
+            # In one piece the unit looks itself.
+            own = self._current(variable.name).ravel()[piece.places]
+            if not np.array_equal(own, values):
+                raise InvalidInput(f"input '{variable.name}' of unit '{self.unit.name}' is fixed after initialisation")
+
+    def _take(self, piece: Piece, values: np.ndarray) -> None:
+        name = piece.run.variable.name
+        self._forget_foreseen()
+        self._read.pop(name, None)
+        if piece.run.variable.causality is Causality.PARAMETER:
+            self.unit.set(name, values.tolist()[0])
+        elif piece.places is None:
+            self._staged.pop(name, None)
+            self.unit.set(name, np.array(values).reshape(piece.run.shape))
+        else:
+            if name not in self._staged:
+                self._staged[name] = np.array(self.unit.get(name), dtype=float).ravel()
+            self._staged[name][piece.places] = values
+
+    def _flush(self) -> None:
+        """Give the unit the inputs that were set in parts."""
+        while self._staged:
+            name, values = self._staged.popitem()
+            self.unit.set(name, values.reshape(self._shape(name)))
+
+    def _current(self, name: str) -> FloatArray:
+        """An input as it is set, parts included."""
+        return np.asarray(self._staged.get(name, self.unit.get(name))).reshape(self._shape(name))
+
+    def _shape(self, name: str) -> tuple[int, ...]:
+        return self.unit.variable(name).shape(self.unit.mesh)
+
+    def _texts(self, references: np.ndarray) -> list[str]:
+        """The variables of `references`, one by one, which have to be texts."""
+        ones = (references[place : place + 1] for place in range(len(references)))
+        return [self._pieces("String", one, 1)[0].run.variable.name for one in ones]
+
     def _advance(self, call: Callable[[], _Result]) -> _Result:
-        self.flush()
+        self._flush()
         self._read.clear()
         return call()
+
+    def _forget(self) -> None:
+        self._staged, self._read, self._derivatives, self._ends = {}, {}, {}, {}
 
     def _forget_foreseen(self) -> None:
         # During the initialization outputs follow whatever is set; afterwards they change in steps only.
         if self.unit.phase is Phase.INITIALIZATION:
             self._read.clear()
 
-    def _stage(self, run: Run) -> np.ndarray:
-        name = run.variable.name
-        if name not in self._staged:
-            if run.variable.causality is not Causality.INPUT:
-                raise InvalidInput(f"'{name}' is {run.variable.causality} and cannot be set")
-            self._staged[name] = np.array(self.unit.get(name), dtype=float).ravel()
-            self._read.pop(name, None)
-        return self._staged[name]
-
     def _values(self, run: Run, warnings: list[str]) -> np.ndarray:
+        if run is TIME:
+            return np.array([self.clock.time])
         name = run.variable.name
         if name not in self._read:
             value = self._output(name, warnings) if run.variable.causality is Causality.OUTPUT else self.unit.get(name)
@@ -167,25 +323,3 @@ class UnitInstance:
                 f"'{name}' has no value as long as the initialization cannot end ({error}); it reads as NaN"
             )
             return None
-
-    def _whole_run(self, references: np.ndarray) -> Run | None:
-        """The run whose value references these are, all of them in their order."""
-        key = (int(references[0]), len(references)) if len(references) else None
-        if key not in self._whole or not (references == self._references[key]).all():
-            return None
-        return self._whole[key]
-
-    def _run(self, reference: int, fmi_type: str) -> Run:
-        """The run that holds `reference`, which has to be of the type that the caller took it for."""
-        run = self._runs[int(np.searchsorted(self._firsts, reference, side="right")) - 1]
-        if not run.first <= reference < run.first + run.size:
-            raise InvalidInput(f"unit '{self.unit.name}' has no value reference {reference}")
-        self._expect(run, reference, fmi_type)
-        return run
-
-    @staticmethod
-    def _expect(run: Run, reference: int, fmi_type: str) -> None:
-        if run.fmi_type != fmi_type:
-            raise InvalidInput(
-                f"value reference {reference}, '{run.variable.name}', is of type {run.fmi_type}, not {fmi_type}"
-            )

@@ -11,9 +11,6 @@ INVALID_INPUT = "invalidInput"
 ERROR_CATEGORY = "logStatusError"
 WARNING_CATEGORY = "logStatusWarning"
 
-#: Why nothing more is done after an error (FMI 2.0.4, section 2.1.3: fmi2Error).
-REFUSED = "the {call} is refused because an earlier call failed; reset the instance or restore a saved state"
-
 
 def category(error: Exception) -> str:
     """The log category of `error`."""

@@ -15,9 +15,9 @@ from lxml import etree
 from lxml.builder import ElementMaker
 
 from ..units.errors import InvalidInput
+from .annotations import TOOL
 from .archive import add, put_in_place
 from .layout import scalar_names
-from .model_description import TOOL
 from .system import Component, Shape, System, Value
 
 #: The file that makes an archive a package.

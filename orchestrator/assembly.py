@@ -8,6 +8,7 @@ from pathlib import Path
 from .coupling.build import build_master, build_scheme
 from .coupling.connections import Connection, connect
 from .coupling.master import Master
+from .coupling.stand_ins import check_stand_ins
 from .errors import InputError, ParticipantError, RunError
 from .fmu_folder import FmuFolder
 from .participants.driven import drive
@@ -53,6 +54,7 @@ def assemble(
     probes = None if mesh is None else Probes(mesh, scenario.output.probes_mm)
     participants = make_participants(stack, scenario, base, mesh, fmu_dir, described)
     connections = connect(participants, scenario.connections, scenario.connect_by_name)
+    check_stand_ins(participants, connections, {name: entry.start for name, entry in scenario.units.items()})
     if scenario.inputs is not None:
         connected = [(link.target.unit, link.target.name) for link in connections]
         ramps = scenario.coupling.interpolation == "linear"
@@ -133,16 +135,16 @@ def make_participants(
 
 
 def _recipe(name: str, entry: UnitEntry, scenario: Scenario, base: Path, mesh: Mesh | None, fmus: FmuFolder) -> Recipe:
-    parameters, ramps = dict(entry.parameters), scenario.coupling.interpolation == "linear"
+    parameters = dict(entry.parameters)
     observe = scenario.observed(name)
     if entry.fmu is not None:
-        return Recipe(name, parameters, ramps, fmu=base / entry.fmu, start=dict(entry.start), observe=observe)
+        return Recipe(name, parameters, fmu=base / entry.fmu, start=dict(entry.start), observe=observe)
     if mesh is None or entry.unit is None:
         raise TypeError("a scenario without a scene has FMUs only")
     if scenario.run.participants == "native":
-        return Recipe(name, parameters, ramps, unit=entry.unit, mesh=mesh, observe=observe)
+        return Recipe(name, parameters, unit=entry.unit, mesh=mesh, observe=observe)
     fmi = 3 if scenario.run.participants == "fmu3" else 2
-    return Recipe(name, parameters, ramps, fmu=fmus.fmu(entry.unit, mesh, fmi), observe=observe)
+    return Recipe(name, parameters, fmu=fmus.fmu(entry.unit, mesh, fmi), observe=observe)
 
 
 @contextmanager

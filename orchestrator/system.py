@@ -6,12 +6,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ..fmus.model_description import INPUT_INTERPOLATION
 from ..fmus.system import Component, Link, System
 from .assembly import called_directly, make_participants
 from .coupling.connections import Connection, connect
 from .errors import InputError
-from .participants.fmu_variables import declares_ramps
 from .participants.native import Mesh
 from .participants.participant import Participant, Ports
 from .scenario import Scenario
@@ -46,8 +44,6 @@ def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[
             _shapes(ports.outputs, {array for unit, array in split["output"] if unit == name}),
             given,
         )
-        if scenario.coupling.interpolation == "linear" and declares_ramps(component.description.modelVariables):
-            given.setdefault(INPUT_INTERPOLATION, "linear")
         components.append(component)
     links: list[Link] = []
     for link in connections:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, frozen
+from .arrays import FloatArray, IntArray, frozen
 from .errors import CallOrderError, InvalidInput, StepFailure
 from .mesh import Mesh
 from .phase import Phase
@@ -215,13 +215,11 @@ class Unit(ABC):
 
     def set(self, name: str, value: ArrayLike | str) -> None:
         """Set a parameter (until the initialisation is over) or an input (shape as declared, finite)."""
-        variable = self.variable(name)
+        variable = self.settable(name)
         if variable.causality is Causality.PARAMETER:
-            self._require(Phase.INSTANTIATED, Phase.INITIALIZATION)
             # A new one, since saved states hold the old.
             self._parameters = self._parameters | {name: variable.checked(value)}
-        elif variable.causality is Causality.INPUT:
-            self._require(Phase.INSTANTIATED, Phase.INITIALIZATION, Phase.STEPPING)
+        else:
             field = self._field(variable, value)
             if variable.fixed and self.phase is Phase.STEPPING:
                 # Many masters set every connected input before every step.
@@ -229,9 +227,43 @@ class Unit(ABC):
                     raise CallOrderError(f"input '{name}' of unit '{self.name}' is fixed after initialisation")
                 return
             self._inputs = self._inputs | {name: field}
+        self._foreseen = None
+
+    def settable(self, name: str) -> Variable:
+        """The variable `name`, if it may be set now.
+
+        Raises
+        ------
+        CallOrderError
+            Later than this phase: parameters until the initialisation is over, inputs until the end.
+        InvalidInput
+            For what is neither.
+        """
+        variable = self.variable(name)
+        if variable.causality is Causality.PARAMETER:
+            self._require(Phase.INSTANTIATED, Phase.INITIALIZATION)
+        elif variable.causality is Causality.INPUT:
+            self._require(Phase.INSTANTIATED, Phase.INITIALIZATION, Phase.STEPPING)
         else:
             raise InvalidInput(f"'{name}' is {variable.causality} of unit '{self.name}' and cannot be set")
-        self._foreseen = None
+        return variable
+
+    def check_values(self, variable: Variable, values: FloatArray, places: IntArray | None = None) -> None:
+        """InvalidInput for values of an input that are not finite, or not above the limit that it has.
+
+        They are those at `places` of its flattened array, or the whole, of its shape.
+        """
+        sound = np.isfinite(values)
+        if not sound.all():
+            place = int(np.flatnonzero(~sound)[0] if places is None else places[~sound][0])
+            index = list(map(int, np.unravel_index(place, variable.shape(self.mesh) or (1,))))
+            kind = variable.location.value if variable.location is not Location.GLOBAL else "index"
+            raise InvalidInput(f"input '{variable.name}' of unit '{self.name}' is not finite at {kind} {index}")
+        if variable.above is not None and values.size and not values.min() > variable.above:
+            raise InvalidInput(
+                f"input '{variable.name}' of unit '{self.name}' is {values.min():.6g} somewhere; "
+                f"it has to be above {variable.above:g}"
+            )
 
     def get(self, name: str) -> Any:
         """A variable's value: read-only array of the declared shape, or the parameter's scalar.
@@ -442,17 +474,7 @@ class Unit(ABC):
             raise InvalidInput(
                 f"input '{variable.name}' of unit '{self.name}' got shape {array.shape}, expected {expected}"
             )
-        if not np.isfinite(array).all():
-            where = np.argwhere(~np.isfinite(np.atleast_1d(array)))[0]
-            place = variable.location.value if variable.location is not Location.GLOBAL else "index"
-            raise InvalidInput(
-                f"input '{variable.name}' of unit '{self.name}' is not finite at {place} {where.tolist()}"
-            )
-        if variable.above is not None and array.size and not array.min() > variable.above:
-            raise InvalidInput(
-                f"input '{variable.name}' of unit '{self.name}' is {array.min():.6g} somewhere; "
-                f"it has to be above {variable.above:g}"
-            )
+        self.check_values(variable, array)
         return array
 
     def _parameter(self, name: str) -> Variable:

@@ -1,5 +1,6 @@
 """The calls of an FMI 2.0 co-simulation FMU, through FMPy."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from ctypes import byref
 from pathlib import Path
@@ -17,14 +18,17 @@ from fmpy.fmi2 import (
     fmi2True,
 )
 
-from ...fmus.model_description import TOOL
+from ...fmus.annotations import TOOL
 from ..errors import ParticipantTerminated
 from .fmu_log import Fmi2Log
 from .fmu_variables import Field
+from .participant import Ramp
 
 
 class Fmi2Calls:
     """See Calls."""
+
+    by_derivatives = True
 
     def __init__(self, description: Any) -> None:
         # Not the description itself: that of a heart holds some ten thousand variables.
@@ -33,7 +37,6 @@ class Fmi2Calls:
         self._is_python = _is_python(description.generationTool or "")
         # FMUs in Python log plain texts: they never give arguments.
         self.log = Fmi2Log(formats=not self._is_python)
-        self.takes_derivatives = bool(description.coSimulation.canInterpolateInputs)
 
     def instantiate(self, folder: Path, name: str) -> None:
         """See Calls."""
@@ -88,6 +91,9 @@ class Fmi2Calls:
         self._slave.fmi2SetRealInputDerivatives(
             self._slave.component, field.references, field.size, orders, field.buffer
         )
+
+    def run(self, ramps: Sequence[tuple[Field, Ramp]]) -> None:
+        """See Calls; an FMU of FMI 2.0 does not ask."""
 
     def set_start(self, variable: Any, value: Any) -> None:
         """See Calls."""

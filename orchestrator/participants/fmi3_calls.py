@@ -3,6 +3,7 @@
 Event mode and early return are not asked for: the FMU handles its events inside of a step (FMI 3.0, section 4.2.1).
 """
 
+from collections.abc import Sequence
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -12,19 +13,26 @@ from fmpy.fmi3 import FMU3Slave
 from ..errors import ParticipantError, ParticipantTerminated
 from .fmu_log import FmuLog
 from .fmu_variables import Field
+from .participant import Ramp
 
 
 class Fmi3Calls:
     """See Calls."""
 
-    #: FMI 3.0 has intermediate updates in place of input derivatives; they are not used.
-    takes_derivatives = False
+    by_derivatives = False
 
     def __init__(self, description: Any) -> None:
         # Not the description itself: that of a heart holds some ten thousand variables.
         self._guid, self._model = description.guid, description.coSimulation.modelIdentifier
         self._slave: Any = None
         self.log = FmuLog()
+        self._asks = description.coSimulation.canInterpolateInputs
+        inputs = (item for item in description.modelVariables if item.causality == "input")
+        self._intermediate = [item.valueReference for item in inputs if item.intermediateUpdate] if self._asks else []
+        # The inputs that run over the step, its times, and what went wrong where the FMU asked for them.
+        self._ramps: Sequence[tuple[Field, Ramp]] = ()
+        self._step = (0.0, 0.0)
+        self._trouble: Exception | None = None
 
     def instantiate(self, folder: Path, name: str) -> None:
         """See Calls."""
@@ -34,7 +42,12 @@ class Fmi3Calls:
             modelIdentifier=self._model,
             instanceName=name,
         )
-        slave.instantiate(loggingOn=True, logMessage=self._hear)
+        slave.instantiate(
+            loggingOn=True,
+            logMessage=self._hear,
+            intermediateUpdate=self._update if self._intermediate else None,
+            requiredIntermediateVariables=self._intermediate,
+        )
         self._slave = slave
 
     def free_instance(self) -> None:
@@ -68,7 +81,11 @@ class Fmi3Calls:
 
     def set_derivative(self, field: Field, order: int) -> None:
         """See Calls."""
-        raise ParticipantError("an FMI 3.0 FMU takes no input derivatives")
+        raise TypeError("FMI 3.0 has no input derivatives")
+
+    def run(self, ramps: Sequence[tuple[Field, Ramp]]) -> None:
+        """See Calls."""
+        self._ramps = ramps
 
     def set_start(self, variable: Any, value: Any) -> None:
         """See Calls."""
@@ -79,7 +96,14 @@ class Fmi3Calls:
     def step(self, time: float, size: float) -> None:
         """See Calls."""
         # True: the master goes back to the step's begin at most, which is not prior to it (section 4.2.1).
-        _, terminate, early, reached = self._slave.doStep(time, size, True)
+        self._step, self._trouble = (time, size), None
+        try:
+            _, terminate, early, reached = self._slave.doStep(time, size, True)
+        finally:
+            self._ramps = ()
+            trouble, self._trouble = self._trouble, None
+        if trouble is not None:
+            raise trouble
         if terminate:
             end = ParticipantTerminated("it asks for the end of the simulation (terminateSimulation)")
             end.time_s = reached
@@ -108,6 +132,32 @@ class Fmi3Calls:
     def unpack(self, data: bytes) -> Any:
         """See Calls."""
         return self._slave.deserializeFMUState(data)
+
+    def _update(
+        self,
+        _environment: Any,
+        time: float,
+        may_set: bool,
+        _may_get: bool,
+        _finished: bool,
+        _may_return: bool,
+        early: Any,
+        _early_time: Any,
+    ) -> None:
+        """Set the inputs to what they are at a `time` inside the step (FMI 3.0, section 4.2.1)."""
+        early[0] = False
+        if not may_set:
+            return
+        begin, size = self._step
+        # In the FMU's sum of the two its end is met to the bit.
+        offset = size if time == begin + size else time - begin
+        try:
+            for field, ramp in self._ramps:
+                field.fill(ramp.value(offset, size))
+                self.set(field)
+        # It cannot pass through the FMU.
+        except Exception as error:
+            self._trouble = error
 
     def _hear(self, _environment: Any, status: int, category: bytes | None, message: bytes | None) -> None:
         self.log.hear(status, category or b"", message or b"")

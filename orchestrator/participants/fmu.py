@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from ...fmus.model_description import FALLBACKS, IMPLEMENTATION, INPUT_INTERPOLATION
+from ...fmus.annotations import FALLBACKS, IMPLEMENTATION
 from ..activity import doing
 from ..errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
 from .fmi2_calls import Fmi2Calls
@@ -28,17 +28,15 @@ from .fmu_variables import (
     Field,
     check_parameters,
     check_start,
-    declares_ramps,
     fields,
     groups,
     ports,
-    ramps_itself,
 )
 from .participant import Abilities, Implementation, Parameters, Ports, Ramp, Values, Wait
-from .ramping import PendingRamps
+from .ramping import Ramps, whole
 from .unpacked import Unpacked
 
-_FATAL = 4
+_ERROR, _FATAL = 3, 4
 
 _MS_PER_S = 1000.0
 
@@ -54,8 +52,9 @@ class Calls(Protocol):
     All calls raise FMPy's FMICallException for a status worse than a warning. Times are in s.
     """
 
-    #: Whether the FMU follows inputs inside a step by their derivatives.
-    takes_derivatives: bool
+    #: Whether inputs run over a step by their derivatives at its begin (FMI 2.0); else by what they are inside of it,
+    #: for which the FMU asks (FMI 3.0).
+    by_derivatives: bool
 
     @property
     def log(self) -> FmuLog:
@@ -86,7 +85,10 @@ class Calls(Protocol):
         """Read an output into the field's buffer."""
 
     def set_derivative(self, field: Field, order: int) -> None:
-        """Set an input's time derivative of `order` from the field's buffer, if the FMU takes derivatives."""
+        """Set an input's time derivative of `order` from the field's buffer."""
+
+    def run(self, ramps: Sequence[tuple[Field, Ramp]]) -> None:
+        """Let inputs run over the next step, where the FMU asks for what they are inside of it."""
 
     def set_start(self, variable: Any, value: Any) -> None:
         """Set a variable of any type, an array to one value everywhere; `variable` is FMPy's."""
@@ -126,8 +128,6 @@ class FmuParticipant:
         The FMU, or the folder that it was unpacked to.
     parameters, start:
         Values of its parameters, and start values of other variables.
-    ramps:
-        Lets inputs run linearly over a step where the FMU can do that.
     observe:
         Variables to be recorded, as names or with `*` and `?`.
     loaded:
@@ -140,13 +140,14 @@ class FmuParticipant:
         path: Path,
         parameters: Parameters,
         start: Parameters | None = None,
-        ramps: bool = False,
         observe: Sequence[str] = (),
         loaded: bool = True,
     ) -> None:
         self.name = name
         self._calls: Calls | None = None
         self._initialized = False
+        #: Whether the FMU returned an error that nothing has brought it back from.
+        self._failed = False
         self._unpacked: Unpacked | None = None
         self._only: tuple[str, str] | None = None
         with self._naming(path):
@@ -154,8 +155,6 @@ class FmuParticipant:
             digest = read_digest(file, {*parameters, *(start or {})}, whole=bool(observe))
             check_binary(digest.names, digest)
             variables = digest.modelVariables
-            if ramps and declares_ramps(variables):
-                parameters = {INPUT_INTERPOLATION: "linear"} | parameters
             check_parameters(parameters, variables)
             check_start(start or {}, variables)
             self._inputs = fields(digest, digest.inputs, parameters)
@@ -165,16 +164,19 @@ class FmuParticipant:
             self._observed = fields(digest, groups(variables, READABLE), parameters) if observe else {}
             self._observable = ports(self._observed)
             self.observed = self._observable.chosen(observe, f"unit '{name}'")
-            ramps_by_itself = ramps_itself(variables, parameters)
-            self.abilities = _abilities(digest.coSimulation, ramps_by_itself, digest.memoryless)
+            self.abilities = _abilities(digest.coSimulation, digest.memoryless)
             self._elements: dict[tuple[bool, str], Field] = {}
-            self._pending = PendingRamps()
-            self._ramps: dict[str, Ramp] = {}
-            self._order = _HIGHEST_ORDER
+            self._ramps = Ramps()
+            # FMI 2.0 has no attribute for the highest order that an FMU takes; this project's take the first.
+            self._order = 1 if digest.fields else _HIGHEST_ORDER
             calls = _CALLS[digest.fmiVersion](digest)
             self._log = calls.log
             self._log.instance = name
-            self._takes_derivatives = calls.takes_derivatives
+            self._by_derivatives = calls.by_derivatives
+            # Inputs get their start values in the initialization mode (FMI 2.0.4, section 4.2.4).
+            starts = start or {}
+            inputs = {item.name: item for item in variables if item.causality == "input" and item.name in starts}
+            self._input_starts = [(item, starts[name]) for name, item in inputs.items()]
             # Made once a step, for it is shown at every call.
             self._activity = self._at_work()
             if not loaded:
@@ -185,7 +187,9 @@ class FmuParticipant:
                 self._instantiate(calls)
                 self._set_up()
                 self._set_values(variables, parameters, "parameter")
-                self._set_values(variables, start or {}, "start value")
+                self._set_values(
+                    variables, {name: starts[name] for name in starts.keys() - inputs.keys()}, "start value"
+                )
             except BaseException:
                 self.close()
                 raise
@@ -196,6 +200,8 @@ class FmuParticipant:
         """See Participant."""
         with self._blaming_input():
             self._call(lambda calls: calls.enter_initialization_mode())
+        for variable, value in self._input_starts:
+            self._set_values([variable], {variable.name: value}, "start value")
 
     def complete(self) -> None:
         """See Participant."""
@@ -205,6 +211,7 @@ class FmuParticipant:
 
     def set(self, name: str, values: Values) -> None:
         """See Participant."""
+        self._ramps.forget(name)
         field = self._field(name, self._inputs, self.inputs)
         # NumPy would spread a single value over the whole field.
         if np.shape(values) != self.inputs[name].shape:
@@ -222,7 +229,7 @@ class FmuParticipant:
         is_output = self.outputs.known(name)
         own, known = (self._outputs, self.outputs) if is_output else (self._observed, self._observable)
         field = self._field(name, own, known)
-        values = self._read(field)
+        values = self._ramps.shown(field.port.name, self.inputs, self._read(field))
         return values if field.port.name == name else known.element(name, lambda _: values)
 
     def _field(self, name: str, own: Mapping[str, Field], known: Ports) -> Field:
@@ -245,20 +252,30 @@ class FmuParticipant:
         return field.values()
 
     def ramp(self, name: str, ramp: Ramp) -> None:
-        """See Participant: by input derivatives where the FMU takes them, else by its own ramp."""
-        if self._takes_derivatives:
-            self._ramps[name] = ramp
-        else:
-            self._pending.add(name, ramp)
+        """See Participant."""
+        self._ramps.add(name, ramp)
 
     def start(self, time: float, size: float) -> Wait:
         """See Participant; the step is done when this returns."""
-        self._pending.apply(self.set, lambda: self._step(time, 0.0))
-        ramps, self._ramps = self._ramps, {}
-        for name, ramp in ramps.items():
-            self._differentiate(name, ramp, size)
+        ramps = self._ramps.take()
+        if self._by_derivatives:
+            for name, ramp in ramps.items():
+                self._differentiate(name, ramp, size)
+        elif ramps:
+            self._run(ramps)
         self._step(time, size)
+        self._ramps.ended(ramps)
         return lambda: None
+
+    def _run(self, ramps: Mapping[str, Ramp]) -> None:
+        """Give inputs as their values at the step's begin, and let the FMU ask for those inside of it."""
+        running = []
+        for name, ramp in whole(ramps, self.inputs, lambda name: self._read(self._inputs[name])).items():
+            field = self._inputs[name]
+            if field.interpolated:
+                running.append((field, ramp))
+            self.set(name, ramp.begin if field.interpolated else ramp.end)
+        self._call(lambda calls: calls.run(running))
 
     def _step(self, time: float, size: float) -> None:
         self._log.time = time
@@ -268,7 +285,7 @@ class FmuParticipant:
     def _differentiate(self, name: str, ramp: Ramp, size: float) -> None:
         """Give an input as its value at the step's begin and its time derivatives there."""
         self.set(name, ramp.begin)
-        slope = (ramp.end - ramp.begin) / size
+        slope = ramp.slope(size)
         derivatives = [slope]
         if ramp.curvature is not None and self._order > 1:
             derivatives = [slope - 0.5 * size * ramp.curvature, ramp.curvature]
@@ -285,7 +302,6 @@ class FmuParticipant:
                         f"it takes no derivatives of its inputs, though canInterpolateInputs is true ({error}); "
                         "use `coupling.interpolation: hold`"
                     ) from None
-                # FMI 2.0 has no attribute for the highest order that an FMU takes.
                 self._order = order - 1
                 print(
                     f"note: unit '{self.name}' takes derivatives of its inputs up to order {self._order}; "
@@ -301,7 +317,10 @@ class FmuParticipant:
 
     def restore(self, state: Any) -> None:
         """See Participant."""
+        self._ramps.forget()
         self._call(lambda calls: calls.restore(state))
+        # The way back from an error (FMI 2.0.4, section 2.1.3; FMI 3.0, section 2.2.3).
+        self._failed = False
 
     def free(self, state: Any) -> None:
         """See Participant; without an instance there is nothing left to free."""
@@ -336,16 +355,16 @@ class FmuParticipant:
     def close(self) -> None:
         """See Participant."""
         calls, self._calls = self._calls, None
-        whole = calls is not None and self._initialized
+        unscathed = calls is not None and self._initialized and not self._failed
         if calls is not None:
-            # An FMU that failed may refuse to terminate; freeing it is all that is left to do.
+            # An FMU that returned an error is not to be terminated; freeing it is all that is left to do.
             try:
-                if self._initialized:
+                if unscathed:
                     self._do(calls, lambda calls: calls.terminate())
             except ParticipantLost:
-                calls, whole = None, False
+                calls, unscathed = None, False
             except ParticipantError:
-                whole = False
+                unscathed = False
         if calls is not None:
             self._do(calls, lambda calls: calls.free_instance())
         if self._only is not None:
@@ -356,7 +375,7 @@ class FmuParticipant:
         if unpacked is not None:
             # An FMU written in Python puts its resources on the path of the process.
             sys.path[:] = [entry for entry in sys.path if not entry.startswith(str(unpacked.folder))]
-            unpacked.give_up(whole)
+            unpacked.give_up(unscathed)
 
     # --- inside -------------------------------------------------------------------------------------------------------
 
@@ -379,6 +398,7 @@ class FmuParticipant:
             with doing(self._activity):
                 return call(calls)
         except FMICallException as error:
+            self._failed = self._failed or error.status >= _ERROR
             if error.status == _FATAL:
                 # FMI allows no further call, not even to free it; those written in Python would crash the process.
                 self._calls = None
@@ -448,12 +468,12 @@ class FmuParticipant:
                 raise InputError(f"{what} '{name}' of type {kind} cannot be {value!r}: {error}") from None
 
 
-def _abilities(declared: Any, ramps_itself: bool, memoryless: bool) -> Abilities:
+def _abilities(declared: Any, memoryless: bool) -> Abilities:
     """From the CoSimulation element of a model description."""
     return Abilities(
         rolls_back=bool(declared.canGetAndSetFMUstate),
         serializes=bool(declared.canGetAndSetFMUstate and declared.canSerializeFMUstate),
-        ramps=ramps_itself or bool(declared.canInterpolateInputs),
+        ramps=bool(declared.canInterpolateInputs),
         any_step_size=bool(declared.canHandleVariableCommunicationStepSize),
         memoryless=memoryless,
     )

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import fmpy
 from lxml import etree
 
-from ...fmus.annotations import TOOL
+from ...fmus.annotations import NAMESPACE, TOOL
 from ..errors import InputError
 from ..quoting import quoted, shortened
 from .fmu_file import DESCRIPTION, FmuFile
@@ -40,6 +40,7 @@ MOST_DIMENSIONS = 16
 #: Elements of an array, 160 MB of numbers; more is a slip of the pen, or meant to fill the memory.
 _MOST_ELEMENTS = 20_000_000
 
+_FIELD = f"{{{NAMESPACE}}}Field"
 _NO_FIELDS: Mapping[str, Mapping[str, str]] = {}
 
 
@@ -59,6 +60,8 @@ class Variable(NamedTuple):
     relativeQuantity: bool = False
     #: FMPy's SimpleType.
     declaredType: Any = None
+    #: Whether an input may be set inside a step (FMI 3.0, section 2.4.7.4).
+    intermediateUpdate: bool = False
 
     @property
     def items(self) -> dict[int, str]:
@@ -67,7 +70,10 @@ class Variable(NamedTuple):
 
 
 class CoSimulation(NamedTuple):
-    """What the master needs of the element of that name; named as in FMPy, with FMI 3.0's names as those of FMI 2.0."""
+    """What the master needs of the element of that name; named as in FMPy, with FMI 3.0's names as those of FMI 2.0.
+
+    An FMU of FMI 3.0 interpolates inputs by intermediate updates.
+    """
 
     modelIdentifier: str
     canHandleVariableCommunicationStepSize: bool
@@ -128,23 +134,24 @@ def read_description(file: FmuFile) -> Description:
             raise InputError(f"FMPy cannot read it as an FMU ({shortened(reason, 200)})") from None
         _check(variables)
     own = _own(root)
-    unit = None if own is None else own.find("Unit")
+    unit = None if own is None else own.find(f"{{{NAMESPACE}}}Unit")
     return Description(
         version,
         head.guid or "",
         head.generationTool or "",
-        _co_simulation(head.coSimulation),
+        _co_simulation(head.coSimulation, version),
         variables,
-        _NO_FIELDS if own is None else {field.get("name"): dict(field.attrib) for field in own.iter("Field")},
+        _NO_FIELDS if unit is None else {field.get("name"): dict(field.attrib) for field in unit.iter(_FIELD)},
         unit is not None and unit.get("memoryless") == "true",
         head.unitDefinitions,
         head.defaultExperiment,
     )
 
 
-def _co_simulation(declared: Any) -> CoSimulation:
+def _co_simulation(declared: Any, version: str) -> CoSimulation:
     identifier, *abilities = (getattr(declared, name) for name in CoSimulation._fields)
-    return CoSimulation(identifier or "", *map(bool, abilities))
+    found = CoSimulation(identifier or "", *map(bool, abilities))
+    return found if version == "2.0" else found._replace(canInterpolateInputs=bool(declared.providesIntermediateUpdate))
 
 
 def _check_items(types: Mapping[str, Any]) -> None:
@@ -244,6 +251,7 @@ def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
         # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
         relative.get(variable.name, bool(kind is not None and kind.relativeQuantity)),
         kind,
+        bool(variable.intermediateUpdate),
     )
 
 

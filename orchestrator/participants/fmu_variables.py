@@ -25,7 +25,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from fmpy.fmi2 import fmi2ValueReference
 
-from ...fmus.model_description import INPUT_INTERPOLATION
 from ..errors import InputError, ParticipantError, did_you_mean
 from ..quoting import quoted, shortened
 from .fmu_description import MOST_DIMENSIONS, Described, Variable
@@ -79,8 +78,12 @@ class Field:
     names of FMI's functions, `fmi2GetReal`, `fmi3GetInt64`.
     """
 
-    def __init__(self, port: Port, fmi_type: str, references: Sequence[int], fmi: int) -> None:
+    def __init__(
+        self, port: Port, fmi_type: str, references: Sequence[int], fmi: int, interpolated: bool = False
+    ) -> None:
         self.port = port
+        #: Whether it is an input that may change inside a step.
+        self.interpolated = interpolated
         self.size = port.size
         self._type, self._fmi = fmi_type, fmi
         self.kind = _KINDS[fmi].get(fmi_type, fmi_type)
@@ -94,7 +97,7 @@ class Field:
     def element(self, name: str, place: int) -> "Field":
         """The field of one element by its name, in FMI 2.0."""
         port = replace(self.port, name=name, shape=())
-        return Field(port, self._type, [self.references[place]], self._fmi)
+        return Field(port, self._type, [self.references[place]], self._fmi, self.interpolated)
 
     @property
     def is_array_variable(self) -> bool:
@@ -175,19 +178,6 @@ def _check_type(what: str, variable: Any, value: Any) -> None:
         raise InputError(f"{what} of type {variable.type} cannot be {value!r}")
 
 
-def declares_ramps(variables: Iterable[Any]) -> bool:
-    """Whether the FMU can ramp its inputs by itself, as this project's do, and has the parameter that says so."""
-    return any(variable.name == INPUT_INTERPOLATION and variable.type == "String" for variable in variables)
-
-
-def ramps_itself(variables: Iterable[Any], parameters: Parameters) -> bool:
-    """Whether that parameter says `linear`."""
-    return any(
-        variable.name == INPUT_INTERPOLATION and parameters.get(variable.name, variable.start) == "linear"
-        for variable in variables
-    )
-
-
 class Group(NamedTuple):
     """Variables that are one field: its name, first index and shape, the first of them, and all value references."""
 
@@ -226,7 +216,10 @@ def fields(description: Described, found: Iterable[Group], parameters: Parameter
     for name, base, shape, first, references in found:
         port = _port(description, name, base, shape, first, parameters)
         if port.size:
-            made[name] = Field(port, first.type, references, int(description.fmiVersion[0]))
+            fmi = int(description.fmiVersion[0])
+            # FMI 2.0 says it of all Real inputs of an FMU at once, FMI 3.0 besides of each.
+            interpolated = port.is_real and (fmi == 2 or first.intermediateUpdate) and not port.discrete
+            made[name] = Field(port, first.type, references, fmi, interpolated)
     return made
 
 
@@ -298,6 +291,7 @@ def _port(
         discrete=not is_real or (first.variability == "discrete" and not fixed),
         items=tuple(first.items) if first.type == "Enumeration" else (),
         base=base,
+        stand_in=extra.get("standIn") == "true",
     )
 
 

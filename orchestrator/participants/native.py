@@ -10,7 +10,6 @@ import numpy as np
 from ...fmus.cache import cached_fmu
 from ...units.errors import InvalidInput, StepFailure
 from ...units.geometry.registry import build as build_geometry
-from ...units.input_ramp import INPUT_INTERPOLATION
 from ...units.mesh import Mesh
 from ...units.mesh.archive import pack_mesh
 from ...units.mesh.file import read_mesh
@@ -30,7 +29,7 @@ from ..errors import InputError, ParticipantError, did_you_mean
 from ..scenario import Scene
 from .accuracy import AccuracyParameter
 from .participant import Abilities, Implementation, Parameters, Port, Ports, Ramp, Values, Wait
-from .ramping import PendingRamps
+from .ramping import Ramps, whole
 
 __all__ = [
     "Coupled",
@@ -160,14 +159,10 @@ def stability_theory(name: str) -> Theory:
     return THEORIES[name]
 
 
-def unit_setting(unit: str, parameters: Parameters, ramps: bool) -> Setting:
-    """A unit as theories see it, with its defaults.
-
-    `ramps` says that the coupling lets inputs run linearly over a step.
-    """
+def unit_setting(unit: str, parameters: Parameters) -> Setting:
+    """A unit as theories see it, with its defaults."""
     declared = {name: variable.start for name, variable in _declared_parameters(unit).items()}
-    linear = {INPUT_INTERPOLATION: "linear"} if ramps and INPUT_INTERPOLATION in declared else {}
-    return Setting(unit, declared | linear | dict(parameters))
+    return Setting(unit, declared | dict(parameters))
 
 
 def amplification(theory: Theory, coupled: Coupled) -> float:
@@ -199,6 +194,7 @@ def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Po
             variable.record.value,
             variable.needs,
             variable.source.name if isinstance(variable, Statistic) else None,
+            stand_in=bool(variable.stand_in),
         )
 
     inputs = Ports({item.name: port(item) for item in kind.inputs()})
@@ -254,12 +250,9 @@ class NativeParticipant:
         unit: str,
         mesh: Mesh,
         parameters: Parameters,
-        ramps: bool = False,
         observe: Sequence[str] = (),
     ) -> None:
         self.name = name
-        if ramps and any(variable.name == INPUT_INTERPOLATION for variable in UNITS[unit].variables()):
-            parameters = {INPUT_INTERPOLATION: "linear"} | parameters
         self.inputs, self.outputs = unit_ports(unit, mesh, parameters)
         every = self.outputs | self.inputs | _parameter_ports(unit)
         # In the order of declaration, as in the unit's FMU.
@@ -271,10 +264,8 @@ class NativeParticipant:
             self._unit.instantiate(parameters)
         except InvalidInput as error:
             raise InputError(f"unit '{name}': {error}") from None
-        self.abilities = Abilities(
-            ramps=parameters.get(INPUT_INTERPOLATION) == "linear", memoryless=UNITS[unit].memoryless
-        )
-        self._pending = PendingRamps()
+        self.abilities = Abilities(ramps=UNITS[unit].interpolates, memoryless=UNITS[unit].memoryless)
+        self._ramps = Ramps()
 
     def begin(self) -> None:
         """See Participant."""
@@ -293,6 +284,7 @@ class NativeParticipant:
     def set(self, name: str, values: Values) -> None:
         """See Participant."""
         try:
+            self._ramps.forget(name)
             if name not in self.inputs:
                 name, values = self.inputs.with_element(name, values, self._unit.get)
             self._unit.set(name, values)
@@ -301,7 +293,7 @@ class NativeParticipant:
 
     def ramp(self, name: str, ramp: Ramp) -> None:
         """See Participant; the curvature is beyond the units."""
-        self._pending.add(name, ramp)
+        self._ramps.add(name, ramp)
 
     def get(self, name: str) -> Values:
         """See Participant."""
@@ -311,19 +303,21 @@ class NativeParticipant:
             values = self._unit.get(name)
         except (InvalidInput, StepFailure) as error:
             raise ParticipantError(str(error)) from error
-        return values if isinstance(values, np.ndarray) else np.asarray(values)
+        return self._ramps.shown(name, self.inputs, np.asarray(values))
 
     def start(self, time: float, size: float) -> Wait:
         """See Participant; the step is done when this returns."""
-        self._pending.apply(self.set, lambda: self._step(time, 0.0))
-        self._step(time, size)
-        return lambda: None
-
-    def _step(self, time: float, size: float) -> None:
+        ramps = self._ramps.take()
         try:
-            self._unit.do_step(time, size)
+            ends = {}
+            for name, ramp in whole(ramps, self.inputs, self._unit.get).items():
+                self.set(name, ramp.begin)
+                ends[name] = ramp.reached(size)
+            self._unit.do_step(time, size, ends)
         except (InvalidInput, StepFailure) as error:
             raise ParticipantError(str(error)) from error
+        self._ramps.ended(ramps)
+        return lambda: None
 
     def save(self) -> Snapshot:
         """See Participant."""
@@ -331,6 +325,7 @@ class NativeParticipant:
 
     def restore(self, state: Snapshot) -> None:
         """See Participant."""
+        self._ramps.forget()
         self._unit.set_state(state)
 
     def free(self, state: Snapshot) -> None:
@@ -342,6 +337,7 @@ class NativeParticipant:
 
     def unpack(self, data: bytes) -> None:
         """See Participant."""
+        self._ramps.forget()
         self._unit.set_state(Snapshot.from_bytes(data))
 
     def implementation(self) -> Implementation:

@@ -35,6 +35,7 @@ class Port:
 
     `type` is that of FMI; Float64 is a Real here. A `discrete` port changes at events only: it is held between
     exchanges. An enumeration has `items`, the numbers it can be. Elements of an array are counted from `base`.
+    What an input starts with is no more than a `stand_in` where only another unit knows what it is.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Port:
     discrete: bool = False
     items: tuple[int, ...] = ()
     base: int = 1
+    stand_in: bool = False
 
     @property
     def is_real(self) -> bool:
@@ -144,6 +146,21 @@ class Ramp:
     begin: Values
     end: Values
     curvature: Values | None = None
+
+    def slope(self, size: float) -> Values:
+        """The difference quotient over a step of `size` s, in 1/s."""
+        return np.asarray((self.end - self.begin) / size)
+
+    def reached(self, size: float) -> Values:
+        """The end as it is computed from the begin and the slope: all participants arrive there to the bit."""
+        return np.asarray(self.begin + size * self.slope(size))
+
+    def value(self, offset: float, size: float) -> Values:
+        """The value `offset` s after the begin of a step of `size` s."""
+        if self.curvature is None or offset == size:
+            return np.asarray(self.begin + offset * self.slope(size))
+        first = self.slope(size) - 0.5 * size * self.curvature
+        return np.asarray(self.begin + offset * first + 0.5 * offset**2 * self.curvature)
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,11 @@ from .participant import Participant
 class Recipe:
     """A unit to be called directly on `mesh`, or an FMU by its path or content.
 
-    `ramps` lets inputs run linearly over a step where the unit can do that; `observe` are variables to be recorded.
+    `observe` are variables to be recorded.
     """
 
     name: str
     parameters: dict[str, Any] = field(default_factory=dict)
-    ramps: bool = False
     unit: str | None = None
     mesh: Mesh | None = None
     fmu: Path | None = None
@@ -38,17 +37,17 @@ class Recipe:
         """The participant as far as it can be known without running anybody's code: it cannot be initialised."""
         if self.fmu is None:
             return self.make()
-        return FmuParticipant(self.name, self.fmu, self.parameters, self.start, self.ramps, self.observe, loaded=False)
+        return FmuParticipant(self.name, self.fmu, self.parameters, self.start, self.observe, loaded=False)
 
     def make(self) -> Participant:
         """The participant; InputError where it cannot be."""
         if self.fmu is None:
             if self.unit is None or self.mesh is None:
                 raise TypeError("a recipe needs an FMU, or a unit and a mesh")
-            return NativeParticipant(self.name, self.unit, self.mesh, self.parameters, self.ramps, self.observe)
+            return NativeParticipant(self.name, self.unit, self.mesh, self.parameters, self.observe)
         if self.content is None:
-            return FmuParticipant(self.name, self.fmu, self.parameters, self.start, self.ramps, self.observe)
+            return FmuParticipant(self.name, self.fmu, self.parameters, self.start, self.observe)
         with tempfile.TemporaryDirectory(prefix="cosim-") as folder:
             path = Path(folder) / self.fmu.name
             path.write_bytes(self.content)
-            return FmuParticipant(self.name, path, self.parameters, self.start, self.ramps, self.observe)
+            return FmuParticipant(self.name, path, self.parameters, self.start, self.observe)

@@ -89,7 +89,6 @@ class Predictor:
 
     def _units(self, scenario: Scenario) -> dict[str, Setting]:
         """The units in their order, those first that it does not name, because they never step."""
-        ramps = scenario.coupling.interpolation == "linear"
         found: dict[str, Setting] = {}
         for name, entry in scenario.units.items():
             if entry.every > 1 and self._theory.of_exchange:
@@ -100,7 +99,7 @@ class Predictor:
             if entry.unit is None:
                 found[name] = Setting(_FMU, dict(entry.parameters) | dict(entry.start))
             else:
-                found[name] = unit_setting(entry.unit, entry.parameters, ramps)
+                found[name] = unit_setting(entry.unit, entry.parameters)
         order = scenario.coupling.order or ()
         return {name: found[name] for name in [*(name for name in found if name not in order), *order]}
 

@@ -3,19 +3,19 @@
 from collections.abc import Iterator
 from importlib.metadata import version
 
-from ..units.unit import Unit
-from .annotations import TOOL
-from .messages import ERROR_CATEGORY, INVALID_INPUT, WARNING_CATEGORY
-from .xml_tag import tag
+from ...units.unit import Unit
+from ..annotations import TOOL
+from ..messages import ERROR_CATEGORY, INVALID_INPUT, WARNING_CATEGORY
+from ..xml_tag import tag
 
 
-def origin(unit: type[Unit], tool: str) -> dict[str, str]:
-    """Attributes of the root: what the FMU of `unit` is, and that `tool` made it."""
+def origin(unit: type[Unit]) -> dict[str, str]:
+    """Attributes of the root: what the FMU of `unit` is, and what made it."""
     return {
         "description": (unit.__doc__ or "").splitlines()[0],
         "version": version(TOOL),
         "license": "BSD-3-Clause",
-        "generationTool": tool,
+        "generationTool": f"{TOOL} {version(TOOL)}",
         "variableNamingConvention": "structured",
     }
 

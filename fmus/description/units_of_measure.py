@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..units.unit import Unit
-from .xml_tag import tag
+from ...units.unit import Unit
+from ..xml_tag import tag
 
 #: SI base units and factor of every unit of measure that a variable may have.
 _UNITS: dict[str, dict[str, float]] = {

@@ -14,10 +14,10 @@ from ...units.mesh import Mesh
 from ...units.unit import Unit
 from ...units.variable import Causality
 from ..annotations import TOOL, annotations
-from ..description_head import default_experiment, log_categories, origin
-from ..unit_definitions import unit_definitions
+from ..layout import TIME, Run, layout
 from ..xml_tag import tag
-from .layout import TIME, Entry, layout
+from .head import default_experiment, log_categories, origin
+from .units_of_measure import unit_definitions
 
 _CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -28,10 +28,10 @@ _CAPABILITIES = {
 }
 
 
-def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> str:
-    """The XML text for `unit` on `mesh`; `token` is the instantiation token, `tool` is what made the FMU."""
-    entries = layout(unit, mesh)
-    outputs = [entry for entry in entries if entry.variable.causality is Causality.OUTPUT]
+def model_description(unit: type[Unit], mesh: Mesh, token: str) -> str:
+    """The XML text for `unit` on `mesh`; `token` is the instantiation token."""
+    runs = layout(unit, mesh)
+    outputs = [run for run in runs if run.variable.causality is Causality.OUTPUT]
     return "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8"?>',
@@ -40,10 +40,10 @@ def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> st
                 fmiVersion="3.0",
                 modelName=unit.name,
                 instantiationToken=token,
-                **origin(unit, tool),
+                **origin(unit),
                 end=False,
             ),
-            tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
+            tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, **_abilities(unit), end=True),
             *unit_definitions(unit, "s"),
             *log_categories(3),
             default_experiment(),
@@ -51,22 +51,18 @@ def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> st
             tag(
                 "Float64",
                 name="time",
-                valueReference=str(TIME),
+                valueReference=str(TIME.reference),
                 causality="independent",
                 variability="continuous",
                 unit="s",
-                description="time that the unit has come to",
+                description=TIME.variable.description,
                 end=True,
             ),
-            *(_variable(entry) for entry in entries),
+            *(_variable(run) for run in runs),
             "</ModelVariables>",
             "<ModelStructure>",
-            *_outputs(entries, outputs),
-            *(
-                tag("InitialUnknown", valueReference=str(entry.reference), end=True)
-                for entry in entries
-                if _is_unknown(entry)
-            ),
+            *_outputs(runs, outputs),
+            *(tag("InitialUnknown", valueReference=str(run.reference), end=True) for run in runs if _is_unknown(run)),
             "</ModelStructure>",
             "<Annotations>",
             tag("Annotation", type=TOOL),
@@ -78,14 +74,18 @@ def model_description(unit: type[Unit], mesh: Mesh, token: str, tool: str) -> st
     )
 
 
-def _is_unknown(entry: Entry) -> bool:
+def _abilities(unit: type[Unit]) -> dict[str, str]:
+    return {"providesIntermediateUpdate": "true"} if unit.interpolates else {}
+
+
+def _is_unknown(run: Run) -> bool:
     """Whether the unit computes its initial value."""
-    return entry.variable.causality in (Causality.OUTPUT, Causality.CALCULATED_PARAMETER)
+    return run.variable.causality in (Causality.OUTPUT, Causality.CALCULATED_PARAMETER)
 
 
-def _variable(entry: Entry) -> str:
-    variable = entry.variable
-    attributes = {"name": variable.name, "valueReference": str(entry.reference), "causality": variable.causality.value}
+def _variable(run: Run) -> str:
+    variable = run.variable
+    attributes = {"name": variable.name, "valueReference": str(run.reference), "causality": variable.causality.value}
     if variable.causality is Causality.PARAMETER:
         attributes |= {"variability": "fixed", "initial": "exact"}
     elif variable.causality is Causality.CALCULATED_PARAMETER:
@@ -95,26 +95,26 @@ def _variable(entry: Entry) -> str:
     if variable.causality is Causality.OUTPUT:
         attributes |= {"initial": "calculated"}
     attributes |= {"description": variable.description}
-    if entry.fmi_type == "Float64":
+    if run.type_in(3) == "Float64":
         attributes |= {"unit": variable.unit}
     # FMI's bounds are inclusive: an exclusive one (above) stays with the unit, which checks it.
     if variable.at_least is not None:
         attributes |= {"min": f"{variable.at_least:.17g}"}
-    nested = "".join(tag("Dimension", start=str(count), end=True) for count in entry.shape)
-    if not _is_unknown(entry):
-        if entry.fmi_type == "String":
+    nested = "".join(tag("Dimension", start=str(count), end=True) for count in run.shape)
+    if not _is_unknown(run):
+        if run.type_in(3) == "String":
             nested += f"<Start value={quoteattr(str(variable.start))}/>"
         else:
             # Of a float, as many digits as it takes to read the same one back; of a field, one value for all places.
             attributes |= {"start": str(variable.start)}
-    return tag(entry.fmi_type, **attributes, end=False) + nested + f"</{entry.fmi_type}>"
+    return tag(run.type_in(3), **attributes, end=False) + nested + f"</{run.type_in(3)}>"
 
 
-def _outputs(entries: tuple[Entry, ...], outputs: list[Entry]) -> Iterator[str]:
-    inputs = {entry.variable.name: entry for entry in entries if entry.variable.causality is Causality.INPUT}
-    for entry in outputs:
-        followed = entry.variable.depends_on
-        attributes = {"valueReference": str(entry.reference)}
+def _outputs(runs: tuple[Run, ...], outputs: list[Run]) -> Iterator[str]:
+    inputs = {run.variable.name: run for run in runs if run.variable.causality is Causality.INPUT}
+    for run in outputs:
+        followed = run.variable.depends_on
+        attributes = {"valueReference": str(run.reference)}
         # Where there are no inputs, an absent list would mean a dependence on the time all the same.
         if not len(followed) == len(inputs) > 0:
             attributes |= {"dependencies": " ".join(str(inputs[name].reference) for name in followed)}

@@ -12,21 +12,14 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..units.input_ramp import INPUT_INTERPOLATION as INPUT_INTERPOLATION
-from ..units.mesh import Mesh
-from ..units.unit import FALLBACKS as _FALLBACKS
-from ..units.unit import IMPLEMENTATION as _IMPLEMENTATION
-from ..units.unit import Unit
-from ..units.variable import Causality, Location
-from .annotations import TOOL as TOOL
-from .annotations import annotations
-from .description_head import default_experiment, log_categories, origin
-from .layout import Run, layout
-from .unit_definitions import unit_definitions
-from .xml_tag import tag
-
-#: The variables in which an FMU says what it computes with.
-IMPLEMENTATION, FALLBACKS = _IMPLEMENTATION.name, _FALLBACKS.name
+from ...units.mesh import Mesh
+from ...units.unit import Unit
+from ...units.variable import Causality, Location
+from ..annotations import TOOL, annotations
+from ..layout import Run, layout
+from ..xml_tag import tag
+from .head import default_experiment, log_categories, origin
+from .units_of_measure import unit_definitions
 
 _CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -38,8 +31,8 @@ _CAPABILITIES = {
 }
 
 
-def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str:
-    """The XML text for `unit` on `mesh`; `tool` is what made the FMU."""
+def model_description(unit: type[Unit], mesh: Mesh, guid: str) -> str:
+    """The XML text for `unit` on `mesh`."""
     runs = layout(unit, mesh)
     return "\n".join(
         [
@@ -49,10 +42,10 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
                 fmiVersion="2.0",
                 modelName=unit.name,
                 guid=guid,
-                **origin(unit, tool),
+                **origin(unit),
                 end=False,
             ),
-            tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, end=True),
+            tag("CoSimulation", modelIdentifier=unit.name, **_CAPABILITIES, **_abilities(unit), end=True),
             *unit_definitions(unit),
             *log_categories(2),
             default_experiment(),
@@ -82,21 +75,26 @@ def model_description(unit: type[Unit], mesh: Mesh, guid: str, tool: str) -> str
     )
 
 
+def _abilities(unit: type[Unit]) -> dict[str, str]:
+    return {"canInterpolateInputs": "true"} if unit.interpolates else {}
+
+
 def _outputs(runs: tuple[Run, ...]) -> list[Run]:
     return [run for run in runs if run.variable.causality is Causality.OUTPUT]
 
 
 def _scalars(run: Run) -> Iterator[str]:
     variable = run.variable
+    fmi_type = run.type_in(2)
     # Of a float, as many digits as it takes to read the same one back.
     start = quoteattr(str(variable.start))
-    unit = f" unit={quoteattr(variable.unit)}" if run.fmi_type == "Real" else ""
+    unit = f" unit={quoteattr(variable.unit)}" if fmi_type == "Real" else ""
     if variable.causality is Causality.PARAMETER:
         kind = ' causality="parameter" variability="fixed" initial="exact"'
-        value = f"<{run.fmi_type} start={start}{unit}{_bounds(run)}/>"
+        value = f"<{fmi_type} start={start}{unit}{_bounds(run)}/>"
     elif variable.causality is Causality.CALCULATED_PARAMETER:
         kind = ' causality="calculatedParameter" variability="fixed" initial="calculated"'
-        value = f"<{run.fmi_type}/>"
+        value = f"<{fmi_type}/>"
     elif variable.causality is Causality.INPUT:
         kind = f' causality="input" variability="{"discrete" if variable.fixed else "continuous"}"'
         value = f"<Real start={start}{unit}/>"
