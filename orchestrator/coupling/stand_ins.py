@@ -22,5 +22,5 @@ def check_stand_ins(
             if port.stand_in and port.name not in fed | given:
                 raise InputError(
                     f"units.{name}: no output feeds its input '{port.name}', which another unit has to give; "
-                    f"add a unit with an output '{port.name}' (fiber_generator gives fibres and sheets), or a connection"
+                    f"add a unit with an output '{port.name}' (fiber_generator has those of fibres), or a connection"
                 )
