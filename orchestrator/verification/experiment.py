@@ -20,7 +20,7 @@ DEFAULT_TOLERANCE = 1e-6
 
 _TABLE, _PARAMETERS = "text/csv", "application/x-ssp-parameter-set"
 
-#: A role of experiments that have no results to be compared with.
+#: The role of experiments that vary what is given, and have no results to be compared with.
 _UNCERTAINTY = "experiment/uncertainty-analysis"
 
 

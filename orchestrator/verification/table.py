@@ -37,10 +37,12 @@ def read_values(content: bytes) -> ValueTable:
         raise InputError(f"its first column is {quoted(names[0])}; it has to be {_TIME}, in s")
     if len(rows) < 2:
         raise InputError("it has names and no values; give a line for every time")
+    seen: set[str] = set()
     for name in names:
-        if not name or names.count(name) > 1:
+        if not name or name in seen:
             what = f"'{shortened(name)}' twice" if name else "without a name"
             raise InputError(f"it has a column {what}; give every column a name of its own")
+        seen.add(name)
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
             raise InputError(f"row {number} has {len(row)} cells, where there are {len(names)} columns")

@@ -111,6 +111,42 @@ def test_a_result_by_itself_is_that_of_the_default_experiment(fmu: Any) -> None:
         assert told in _failure(other)
 
 
+def test_columns_of_types_that_fmi_2_lacks_are_left_out_of_results_by_themselves_only(fmu: Any) -> None:
+    # Reference-FMUs' Feedthrough has the results of its FMI 3.0 form in its FMI 2.0 form too.
+    alone = {"fmi-ls-manifest.xml": reference.manifest('<Related type="text/csv" source="out.csv" role="result"/>')}
+    alone["out.csv"] = "time,y,Int8_output\n0,0,0\n1,0,0\n"
+    path = fmu(files=alone)
+    assert _verdicts(path) == {"y": Verdict.WITHIN, "Int8_output": Verdict.LEFT_OUT}
+    assert verify_fmu(path).is_verified
+    assert "Int8_output" in verify_fmu(path).notes[0]
+    # But not everything can be left out, and an experiment's own results are those of this FMU.
+    assert "none of the variables" in _failure(fmu(files=alone | {"out.csv": "time,Int8_output\n0,0\n1,0\n"}))
+    own = _files() | {"out.csv": _OUT.replace("time,y,", "time,Int8_output,")}
+    assert _verdicts(fmu(files=own))["Int8_output"] is Verdict.LACKING
+
+
+def test_an_experiment_without_results_is_run_but_verifies_nothing(bodies: dict[str, Path], tmp_path: Path) -> None:
+    bare = '<Experiment name="two" stopTime="END" stepSize="0.01"/>'
+    one = reference.experiments('stopTime="0.02" stepSize="0.01"', '<References source="out.csv"/>')
+    files: Files = {
+        "fmi-ls-manifest.xml": reference.manifest(reference.related()),
+        "tests.exp": one.replace("</Experiments>", f"{bare}</Experiments>").replace("END", "0.02"),
+        "out.csv": "time,x\n0,0\n0.02,0\n",
+    }
+    verification = verify_fmu(reference.with_files(bodies["dies"], tmp_path / "a.fmu", files))
+    assert verification.is_verified
+    assert [outcome.compared for outcome in verification.outcomes] == [1, 0]
+    assert "'two' has no results" in verification.notes[0]
+    # It fails all the same where the FMU does.
+    files["tests.exp"] = one.replace("</Experiments>", f"{bare}</Experiments>").replace("END", "0.1")
+    verification = verify_fmu(reference.with_files(bodies["dies"], tmp_path / "a.fmu", files))
+    assert not verification.is_verified
+    assert "experiment 'two': the FMU failed in the step from 0.05" in verification.reasons[0]
+    files["tests.exp"] = f'<Experiments name="tests">{bare.replace("END", "0.02")}</Experiments>'
+    with pytest.raises(InputError, match="no experiment with results"):
+        verify_fmu(reference.with_files(bodies["dies"], tmp_path / "a.fmu", files))
+
+
 def test_parameters_of_the_set_are_applied(fmu: Any) -> None:
     ssv = (
         '<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0" '
