@@ -13,7 +13,7 @@ from ..quoting import quoted, shortened
 from ..untrusted.document import parse_document
 from .manifest import EXPERIMENT_TYPES, Manifest, Related
 from .reference_files import MANIFEST_PATH, ReferenceFiles
-from .schemas import check_experiments
+from .schema_check import check_experiments
 
 #: The relative tolerance where neither the experiment nor the FMU's default experiment has one.
 DEFAULT_TOLERANCE = 1e-6

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..quoting import shortened
 from ..untrusted.document import parse_document
 from .reference_files import MANIFEST_PATH, ReferenceFiles
-from .schemas import check_manifest
+from .schema_check import check_manifest
 
 _NAME, _STATEMENT = f"{{{NAMESPACE}}}fmi-ls-name", f"{{{NAMESPACE}}}fmi-ls-description"
 

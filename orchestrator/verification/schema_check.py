@@ -1,4 +1,4 @@
-"""The schemas of FMI-LS-REF, which manifests and experiments are checked against; where they are from: `schema`."""
+"""The schemas of FMI-LS-REF, which manifests and experiments are checked against; where they are from: `schemas`."""
 
 from functools import cache
 from pathlib import Path
@@ -10,7 +10,7 @@ from lxml import etree
 from ..errors import InputError
 from ..quoting import shortened
 
-_FOLDER = Path(__file__).parent / "schema"
+_FOLDER = Path(__file__).parent / "schemas"
 
 #: The files of FMI's own schemas that those refer to by their addresses; FMPy has them.
 _FMI = Path(fmpy.__file__).parent / "schema" / "fmi3"
