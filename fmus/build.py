@@ -21,6 +21,7 @@ from .archive import write_archive
 from .binaries import binaries
 from .description import model_description
 from .instance import MESH_FILE
+from .reference_members import reference_members
 
 #: What an FMU carries of this floor; the units' floor goes whole, but for the geometries (the mesh is in the FMU).
 _OWN_FILES = (
@@ -109,6 +110,7 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path, fmi: int = 2) -> 
             f"resources/{MESH_FILE}": packed.read_bytes(),
         }
         members |= binaries(unit.name, fmi)
+        members |= reference_members(unit, mesh, fmi)
     write_archive(members, destination)
     return destination
 
