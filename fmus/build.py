@@ -23,6 +23,7 @@ from .binaries import binaries
 from .description import check_size, model_description
 from .documents import PACKAGES, documents, rendered, shipped
 from .instance import MESH_FILE
+from .reference_members import reference_members
 
 #: What an FMU carries of this floor; the units' floor goes whole, but for the geometries (the mesh is in the FMU).
 _OWN_FILES = (
@@ -90,7 +91,7 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path, fmi: int = 2) -> 
             "resources/load.py": loader,
             f"resources/{MESH_FILE}": packed.read_bytes(),
         }
-    members |= binaries(unit.name, fmi) | documents(unit, mesh, fmi)
+    members |= binaries(unit.name, fmi) | documents(unit, mesh, fmi) | reference_members(unit, mesh, fmi)
     write_archive(members, destination)
     return destination
 
