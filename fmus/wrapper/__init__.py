@@ -1,13 +1,17 @@
-"""This project's own FMI 2.0 wrapper in C (`fmi2.c`, `python.c`), compiled when the package is built."""
+"""This project's own wrapper of FMI 2.0 and 3.0 in C, compiled for every platform by `setup.py`."""
 
 from pathlib import Path
 
-
-def library() -> Path | None:
-    """The compiled wrapper; None where the package was built without a C compiler."""
-    return next(iter(sorted(Path(__file__).parent.glob("fmi2.*so"))), None)
+from .platforms import BINARIES, this_platform
 
 
 def libraries() -> dict[str, Path]:
-    """Temporary."""
-    return {"x86_64-linux": library()}  # type: ignore[dict-item]
+    """The compiled wrapper for each platform, by FMI 3's platform tuple, as far as it was built."""
+    folder = Path(__file__).parent / "binaries"
+    paths = {name: folder / name / file for name, file in BINARIES.items()}
+    return {name: path for name, path in paths.items() if path.is_file()}
+
+
+def library() -> Path | None:
+    """The compiled wrapper for this machine; None where there is none."""
+    return libraries().get(this_platform())

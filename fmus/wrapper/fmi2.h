@@ -1,5 +1,6 @@
-/* The part of FMI 2.0.4 for co-simulation that the wrapper has, in the words of the standard (its sections 2.1 and 4.2). With
- * COSIM_STANDARD_HEADERS the standard's own header is taken instead, against which a test compiles the wrapper. */
+/* The part of FMI 2.0.4 for co-simulation that the wrapper has, in the words of the standard (its sections 2.1
+ * and 4.2). With COSIM_STANDARD_HEADERS the standard's own header is taken instead, against which a test compiles the
+ * wrapper. */
 #ifndef COSIM_WRAPPER_FMI2_H
 #define COSIM_WRAPPER_FMI2_H
 
@@ -7,9 +8,11 @@
 #include "fmi2Functions.h"
 #else
 
+#include "export.h"
+
 #include <stddef.h>
 
-#define FMI2_Export __attribute__((visibility("default")))
+#define FMI2_Export COSIM_EXPORT
 
 typedef void *fmi2Component;
 typedef void *fmi2ComponentEnvironment;
