@@ -72,6 +72,12 @@ class UnitInstance:
                 "and its termination only"
             )
 
+    def prepare_step(self, time: float, size: float) -> None:
+        """Before an intermediate update gives inputs at the end of a step; InvalidInput if there is no such step."""
+        self.check_step(time, size)
+        # What was given for a step that was not taken then.
+        self._ends = {}
+
     def do_step(self, time: float, size: float) -> None:
         """fmi2DoStep and fmi3DoStep; StepFailure leaves the state as it was."""
         self.check_step(time, size)

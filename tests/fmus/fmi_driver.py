@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
+from xml.etree import ElementTree
 
 import numpy as np
 from fmpy import extract, platform, platform_tuple, read_model_description, sharedLibraryExtension
@@ -376,6 +377,12 @@ class Fmi3Driver(Driver):
         self.stepped: tuple[float, bool, bool, bool] = (0.0, False, False, False)
         super().__init__(path, instance, logging)
 
+    def updated(self) -> list[int]:
+        """The variables that may be set in an intermediate update (FMPy does not read the attribute)."""
+        root = ElementTree.parse(Path(self.folder) / "modelDescription.xml").getroot()
+        asked = root.iterfind("ModelVariables/*[@intermediateUpdate='true']")
+        return [int(element.attrib["valueReference"]) for element in asked]
+
     def made(self, name: str, token: str, **rest: Any) -> int | None:
         """See Driver; `rest` may have the `location` of the resources, and whether `events` are used."""
         self._logger = fmi3LogMessageCallback(self._log)
@@ -385,12 +392,11 @@ class Fmi3Driver(Driver):
     def instantiated(self, name: str, token: str, location: str | None = None, events: bool = False) -> int | None:
         """See `made`; with the callbacks as they are."""
         place = str(Path(self.folder) / "resources") + "/" if location is None else location
-        asked = [item.valueReference for item in self.description.modelVariables if item.intermediateUpdate]
         function = self.function("InstantiateCoSimulation")
         function.restype = ctypes.c_void_p
         flags = [ctypes.c_bool(flag) for flag in (False, self.logging, events, False)]
         result: int | None = function(
-            name.encode(), token.encode(), place.encode(), *flags, *_vr(asked if self._update else []), None,
+            name.encode(), token.encode(), place.encode(), *flags, *_vr(self.updated() if self._update else []), None,
             self._logger, self._updater,
         )  # fmt: skip
         return result

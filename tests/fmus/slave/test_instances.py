@@ -1,5 +1,6 @@
 """If these fail, an FMU needs this project, or FMUs in one process run each other's code or share states."""
 
+import ctypes
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -121,7 +122,7 @@ def test_every_form_of_the_resources_location(unpacked: Any) -> None:
     for location in _locations(unpacked.fmi, Path(unpacked.folder) / "resources"):
         instance = unpacked.made("x", unpacked.description.guid, location=location)
         assert instance, (location, unpacked.messages)
-        unpacked.component = instance
+        unpacked.component = ctypes.c_void_p(instance)
         unpacked.free()
     assert unpacked.messages == []
 

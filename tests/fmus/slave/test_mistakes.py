@@ -23,8 +23,10 @@ def _told(driver: Any, words: str) -> None:
 
 
 def _is_nothing(value: Any) -> bool:
-    """Whether nobody would take it for a number of the unit's."""
-    return value in (0, False, "", None) or value != value or value < -100 or value == -(2**7)
+    """Whether nobody would take it for a value of the unit's: a text is left as the host had it."""
+    if isinstance(value, str):
+        return value == "untouched"
+    return value in (0, False) or value != value or value < -100
 
 
 _ANY: dict[str, tuple[Mistake, str]] = {
