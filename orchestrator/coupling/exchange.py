@@ -151,7 +151,8 @@ class Exchange:
             at_end = self._at_end(link.source)
             self._uses[link] = Use(at_end, ramps)
             with blaming(unit):
-                if ramps and not port.discrete:
+                # What changes at events only jumps to where it is: it is held.
+                if ramps and not port.discrete and link.source in self._histories:
                     participant.ramp(port.name, self._ramp(unit, link, port))
                 else:
                     participant.set(port.name, fitted(link.carried(at_end), port))
@@ -235,10 +236,6 @@ class Exchange:
         """How the input `port` runs over the step, fed by `link`."""
         source, curvature = link.source, None
         end = self._at_end(source)
-        if source not in self._histories:
-            # A unit that ramps its inputs would ramp from the value before: there is no way but to begin where it ends.
-            held = fitted(link.carried(end), port)
-            return Ramp(held, held)
         begin = self._begins[unit].get(source, self._values[source])
         if self._behaviour.extrapolation >= 2:
             curvature = 0.0 * end if source in self._known else self._histories[source].curvature()
