@@ -17,7 +17,7 @@ from .phase import Phase
 from .snapshot import Snapshot, State
 from .statistics import Statistic, statistics
 from .taken import Taken
-from .variable import Causality, Scalar, Variable, parameters_of
+from .variable import Causality, Location, Scalar, Variable, parameters_of
 
 Group = TypeVar("Group")
 _MS_PER_S = 1000.0
