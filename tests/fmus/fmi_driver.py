@@ -263,19 +263,17 @@ class Driver:
     def _derivative(
         self, name: str, unknowns: Sequence[str], knowns: Sequence[str], seed: Any, wanted: Sequence[str]
     ) -> list[float]:
-        weights = np.ravel(seed).tolist()
-        target = (ctypes.c_double * sum(map(self.size, wanted)))(*[123.25] * sum(map(self.size, wanted)))
-        lists = [[vr for name in names for vr in self.references(name)] for names in (unknowns, knowns)]
-        seeds = (ctypes.c_double * len(weights))(*weights)
-        self.call(
-            name,
-            *_vr(lists[0]),
-            *_vr(lists[1]),
-            seeds,
-            *self._counted("Float64", weights),
-            target,
-            *self._counted("Float64", target),
-        )
+        references = [[vr for field in names for vr in self.references(field)] for names in (unknowns, knowns)]
+        return self.derivative(name, *references, np.ravel(seed).tolist(), sum(map(self.size, wanted)))
+
+    def derivative(
+        self, name: str, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], count: int
+    ) -> list[float]:
+        """The `count` numbers that the function `name` gives, by value references."""
+        target = (ctypes.c_double * count)(*[_UNTOUCHED[ctypes.c_double]] * count)
+        seeds = (ctypes.c_double * len(seed))(*seed)
+        given, asked = self._counted("Float64", seed), self._counted("Float64", target)
+        self.call(name, *_vr(unknowns), *_vr(knowns), seeds, *given, target, *asked)
         return list(target)
 
 

@@ -39,6 +39,7 @@ _BOTH = """
     set a parameter          x x - - -
     set a choice             x x - - -
     set an output            - - - - -
+    derivatives              - x x x x     of outputs by inputs; discarded: of the last step that was completed
     get a state              x x x x x
     set a state              x x x x x
     serialize a state        x x x x x
@@ -60,6 +61,7 @@ _TABLES = {
 """,
     3: _BOTH
     + """
+    adjoint derivatives      - x x x x
     get the time             x x x x x
     set the time             - - - - -
     enter event mode         - - - - -     hasEventMode is false
@@ -104,6 +106,12 @@ def _write(kind: type, name: str, value: Any) -> Call:
     return lambda driver: driver.write(driver.kinds[kind], driver.references(name), [value] * driver.size(name))
 
 
+def _derivative(driver: Any, name: str) -> int:
+    refused = len(driver.refused)
+    driver.derivative(name, driver.references("active_stress"), driver.references("potential"), [1.0] * 16, 16)
+    return int(driver.refused[-1][1]) if len(driver.refused) > refused else 0
+
+
 def _step(driver: Any) -> int:
     return int(driver.advance(driver.reached(), 1e-3))
 
@@ -129,6 +137,8 @@ _CALLS: dict[str, Call] = {
     "set a parameter": _write(float, "slow_rate_per_ms", 0.2),
     "set a choice": _write(str, "delay_function", "gompertz"),
     "set an output": _write(float, "active_stress", 1.0),
+    "derivatives": lambda driver: _derivative(driver, "GetDirectionalDerivative"),
+    "adjoint derivatives": lambda driver: _derivative(driver, "GetAdjointDerivative"),
     "get a state": lambda driver: _state(driver, lambda state: 0),
     "set a state": lambda driver: _state(driver, driver.restore),
     "serialize a state": _serialized,
