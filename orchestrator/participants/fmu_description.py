@@ -8,7 +8,7 @@ and system packages read all FMUs through here.
 import gc
 import io
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
@@ -124,7 +124,12 @@ def read_description(file: FmuFile) -> Description:
                     element.get("name"): element.get("relativeQuantity") in _TRUE
                     for element in root.iterfind("ModelVariables/*[@relativeQuantity]")
                 }
-                variables = [_of_fmpy(variable, relative) for variable in head.modelVariables]
+                updated = {
+                    element.get("name")
+                    for element in root.iterfind("ModelVariables/*[@intermediateUpdate]")
+                    if element.get("intermediateUpdate") in _TRUE
+                }
+                variables = [_of_fmpy(variable, relative, updated) for variable in head.modelVariables]
         except InputError:
             raise
         # FMPy raises plain Exceptions.
@@ -236,7 +241,7 @@ def _variable(element: Any, types: Mapping[str, Any]) -> Variable:
     )
 
 
-def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
+def _of_fmpy(variable: Any, relative: Mapping[str, bool], updated: Collection[str]) -> Variable:
     kind = variable.declaredType
     return Variable(
         variable.name,
@@ -248,10 +253,10 @@ def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
         variable.unit or (None if kind is None else kind.unit),
         variable.start,
         variable.shape,
-        # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
+        # FMPy 0.3.32 looks for this attribute among the children of the element, for the last one nowhere.
         relative.get(variable.name, bool(kind is not None and kind.relativeQuantity)),
         kind,
-        bool(variable.intermediateUpdate),
+        variable.name in updated,
     )
 
 
