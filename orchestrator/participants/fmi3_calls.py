@@ -54,12 +54,12 @@ class Fmi3Calls:
         """See Calls."""
         self._slave.freeInstance()
 
-    def setup_experiment(self) -> None:
+    def setup_experiment(self, start: float) -> None:
         """See Calls; in FMI 3.0 the experiment begins with the initialization mode."""
 
-    def enter_initialization_mode(self) -> None:
+    def enter_initialization_mode(self, start: float) -> None:
         """See Calls."""
-        self._slave.enterInitializationMode(startTime=0.0)
+        self._slave.enterInitializationMode(startTime=start)
 
     def exit_initialization_mode(self) -> None:
         """See Calls."""
