@@ -593,7 +593,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('version="1.0" name="two masses"', 'version="3.0" name="two masses"')],
             {},
-            ["SystemStructure.ssd, line 5", "version"],
+            ["SystemStructure.ssd: it is of SSP 3.0", "export it by SSP 1.0 or 2.0"],
         ),
         (
             [("<ssd:Connections>", "<ssd:Conections>"), ("</ssd:Connections>", "</ssd:Conections>")],
