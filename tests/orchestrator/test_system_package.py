@@ -30,8 +30,8 @@ def _set(*assignments: str) -> list[str]:
     return [word for assignment in assignments for word in ("--set", assignment)]
 
 
-def _package(cosim: Cosim, scenario: Path, folder: Path, *assignments: str) -> Path:
-    ended = cosim("build", scenario, "--output", folder, "--ssp", *_set(*assignments))
+def _package(cosim: Cosim, scenario: Path, folder: Path, *assignments: str, fmi: int = 2) -> Path:
+    ended = cosim("build", scenario, "--output", folder, "--ssp", "--fmi", str(fmi), *_set(*assignments))
     assert ended.code == 0, ended.err
     (path,) = folder.glob("*.ssp")
     assert str(path) in ended.out.splitlines()
@@ -48,25 +48,36 @@ def _fields(folder: Path) -> dict[str, np.ndarray]:
 # --- our own packages -------------------------------------------------------------------------------------------------
 
 
+_ITERATED = "coupling.iterate={acceleration: anderson, converge: {stretch: {relative: 1e-6}}}"
+
+
 @pytest.mark.parametrize(
-    ("scene", "assignments"),
+    ("scene", "assignments", "fmi"),
     [
-        ("cell", ("run.stop_ms=30",)),
-        ("strand", _COARSE),
-        ("strand", (*_COARSE, "coupling.scheme=jacobi", "coupling.interpolation=linear", "coupling.extrapolation=1")),
+        ("cell", ("run.stop_ms=30",), 2),
+        ("cell", ("run.stop_ms=30",), 3),
+        ("strand", _COARSE, 2),
+        ("strand", _COARSE, 3),
+        (
+            "strand",
+            (*_COARSE, "coupling.scheme=jacobi", "coupling.interpolation=linear", "coupling.extrapolation=1"),
+            2,
+        ),
         (
             "strand",
             (*_COARSE, "units.mechanics.every=4", "coupling.order=[mechanics, electrophysiology, active_stress]"),
+            3,
         ),
-        ("strand", (*_COARSE, "coupling.adaptive={tolerance: 0.05, min_ms: 0.5, max_ms: 5}")),
-        ("strand", (*_COARSE, "coupling.iterate={acceleration: anderson, converge: {stretch: {relative: 1e-6}}}")),
+        ("strand", (*_COARSE, "coupling.adaptive={tolerance: 0.05, min_ms: 0.5, max_ms: 5}"), 2),
+        ("strand", (*_COARSE, _ITERATED), 2),
+        ("strand", (*_COARSE, _ITERATED, "coupling.interpolation=linear"), 3),
     ],
 )
 def test_a_scenario_runs_from_its_package_to_the_same_bits(
-    scene: str, assignments: tuple[str, ...], cosim: Cosim, tmp_path: Path
+    scene: str, assignments: tuple[str, ...], fmi: int, cosim: Cosim, tmp_path: Path
 ) -> None:
     scenario = _SCENARIOS / f"{scene}.yaml"
-    package = _package(cosim, scenario, tmp_path / "built", *assignments)
+    package = _package(cosim, scenario, tmp_path / "built", *assignments, fmi=fmi)
     for source, name, sets in ((scenario, "yaml", assignments), (package, "ssp", ())):
         ended = cosim("run", source, "--output", tmp_path / name, *_set(*sets))
         assert ended.code == 0, ended.err
@@ -79,8 +90,9 @@ def test_a_scenario_runs_from_its_package_to_the_same_bits(
         np.testing.assert_array_equal(values, after[name], err_msg=name)
 
 
-def test_a_package_of_a_package_is_the_same_package(cosim: Cosim, tmp_path: Path) -> None:
-    first = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "first", *_COARSE)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_package_of_a_package_is_the_same_package(fmi: int, cosim: Cosim, tmp_path: Path) -> None:
+    first = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "first", *_COARSE, fmi=fmi)
     again = _package(cosim, first, tmp_path / "again")
     assert first.read_bytes() == again.read_bytes()
 
@@ -128,7 +140,11 @@ def test_another_tool_may_change_what_the_standard_has_a_place_for(cosim: Cosim,
 
 
 def test_packages_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
-    sets = (*_COARSE, "units.electrophysiology.parameters.refine=1", "coupling.interpolation=linear")
+    sets = (
+        *_COARSE,
+        "units.electrophysiology.parameters.refine=1",
+        "units.active_stress.parameters.time_integration=exact",
+    )
     package = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "built", *sets)
     # FMPy validates it, and the parameter sets, against the schemas of SSP 1.0.
     ssd = read_ssd(str(package), validate=True)
@@ -151,8 +167,7 @@ def test_packages_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
         ("electrophysiology", "stimulus_x_min_mm"): ("Real", "-1.0", "mm"),
         ("electrophysiology", "stimulus_x_max_mm"): ("Real", "8.0", "mm"),
         ("electrophysiology", "refine"): ("Integer", "1", None),
-        ("electrophysiology", "input_interpolation"): ("String", "linear", None),
-        ("active_stress", "input_interpolation"): ("String", "linear", None),
+        ("active_stress", "time_integration"): ("String", "exact", None),
     }
     units = {unit.name: unit for unit in ssd.units}
     assert (units["mV"].kg, units["mV"].m, units["mV"].s, units["mV"].A, units["mV"].factor) == (1, 2, -3, -1, 1e-3)
