@@ -49,7 +49,7 @@ def fits(shape: tuple[int, ...], said: Sizes) -> bool:
 
 def written(shape: Sizes) -> str:
     """A shape as messages have it."""
-    return " × ".join("?" if size is None else str(size) for size in shape) or "a scalar"
+    return f"an array of {' × '.join('?' if size is None else str(size) for size in shape)}" if shape else "a scalar"
 
 
 def check_connector(part: SystemComponent, name: str, kind: str) -> None:

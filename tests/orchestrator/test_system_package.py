@@ -13,14 +13,16 @@ import build_body
 import h5py
 import numpy as np
 import pytest
-from cardiac_cosim.orchestrator import stopping
+from cardiac_cosim.orchestrator import ssp, stopping
 from cardiac_cosim.orchestrator.errors import InputError
 from cardiac_cosim.orchestrator.ssp import open_package
 from fmpy.ssp import simulation
 from fmpy.ssp.ssd import read_ssd
+from lxml import etree
 
 _ROOT = Path(__file__).parent.parent.parent
 _SCENARIOS = _ROOT / "scenarios"
+_SCHEMAS = Path(ssp.__file__).parent / "schemas"
 _COARSE = ("scene.mesh_size_mm=4", "run.stop_ms=20")
 
 Cosim = Callable[..., Any]
@@ -179,6 +181,73 @@ def test_packages_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
     fed = {(element, connector) for _, _, element, connector in ends}
     inputs = {(c.name, k.name) for c in components.values() for k in c.connectors if k.kind == "input"}
     assert inputs == fed
+
+
+def test_packages_of_fmi_3_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
+    sets = (
+        *_COARSE,
+        "units.electrophysiology.parameters.refine=1",
+        "units.active_stress.parameters.time_integration=exact",
+    )
+    package = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "built", *sets, fmi=3)
+    with zipfile.ZipFile(package) as archive:
+        texts = {name: archive.read(name) for name in archive.namelist() if name.endswith((".ssd", ".ssv"))}
+    roots = {name: etree.fromstring(text) for name, text in texts.items()}
+    assert len(roots) == 3
+    for name, root in roots.items():
+        kind = "Description" if name.endswith(".ssd") else "ParameterValues"
+        etree.XMLSchema(file=str(_SCHEMAS / f"SystemStructure{kind}.xsd")).assertValid(root)
+        assert root.get("version") == "2.0"
+    structure = roots["SystemStructure.ssd"]
+    ends = ("startElement", "startConnector", "endElement", "endConnector")
+    assert {tuple(map(each.get, ends)) for each in structure.iterfind(".//{*}Connection")} == {
+        ("mechanics", "stretch", "electrophysiology", "stretch"),
+        ("fibers", "fiber", "electrophysiology", "fiber"),
+        ("fibers", "fiber", "mechanics", "fiber"),
+        ("fibers", "sheet", "mechanics", "sheet"),
+        ("electrophysiology", "potential", "active_stress", "potential"),
+        ("active_stress", "active_stress", "mechanics", "active_stress"),
+    }
+    (fiber,) = structure.iterfind(".//{*}Component[@name='fibers']//{*}Connector[@name='fiber']")
+    assert [(etree.QName(each).localname, dict(each.attrib)) for each in fiber][:3] == [
+        ("Float64", {"unit": "1"}),
+        ("Dimension", {"size": "15"}),
+        ("Dimension", {"size": "3"}),
+    ]
+    given = {
+        (name, parameter.get("name")): (etree.QName(parameter[0]).localname, dict(parameter[0].attrib))
+        for name, root in roots.items()
+        for parameter in root.iterfind(".//{*}Parameter")
+    }
+    assert given == {
+        ("resources/electrophysiology.ssv", "time_scale_reduction"): ("Float64", {"value": "0.0", "unit": "1"}),
+        ("resources/electrophysiology.ssv", "stimulus_x_min_mm"): ("Float64", {"value": "-1.0", "unit": "mm"}),
+        ("resources/electrophysiology.ssv", "stimulus_x_max_mm"): ("Float64", {"value": "8.0", "unit": "mm"}),
+        ("resources/electrophysiology.ssv", "refine"): ("Int32", {"value": "1"}),
+        ("resources/active_stress.ssv", "time_integration"): ("String", {"value": "exact"}),
+    }
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_components_do_not_lie_on_each_other(fmi: int, cosim: Cosim, tmp_path: Path) -> None:
+    package = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "built", *_COARSE, fmi=fmi)
+    with zipfile.ZipFile(package) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    boxes = {
+        part.get("name"): [float(part.find("{*}ElementGeometry").get(side)) for side in ("x1", "y1", "x2", "y2")]
+        for part in root.iterfind(".//{*}Component")
+    }
+    # One behind the other, in the order of execution, and on the canvas.
+    (canvas,) = root.iterfind(".//{*}SystemGeometry")
+    edges = [x for name in ("fibers", "electrophysiology", "active_stress", "mechanics") for x in boxes[name][::2]]
+    assert edges == sorted(edges)
+    assert float(canvas.get("x1")) < edges[0]
+    assert edges[-1] < float(canvas.get("x2"))
+    for connector in root.iterfind(".//{*}Connector"):
+        place = connector.find("{*}ConnectorGeometry")
+        assert place.get("x") == {"input": "0.0", "output": "1.0"}[connector.get("kind")]
+        assert 0.0 < float(place.get("y")) < 1.0
+    assert all(each.find("{*}ConnectionGeometry") is not None for each in root.iterfind(".//{*}Connection"))
 
 
 # --- FMPy -------------------------------------------------------------------------------------------------------------
