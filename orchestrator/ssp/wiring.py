@@ -62,13 +62,6 @@ class Wiring:
         self._feeding: dict[Pin, Hop] = {}
         for node in self.systems.values():
             for element in named(node.element, "ssd:Connections/ssd:Connection"):
-                for side in ("start", "end"):
-                    if element.get(f"{side}Indices") is not None:
-                        raise InputError(
-                            f"the connection of {_end(node, element, 'start')} to {_end(node, element, 'end')} has "
-                            f"{side}Indices, and the standard does not say whether those count from 0 or 1; connect "
-                            "the whole arrays"
-                        )
                 source, target = self._ends(node, element)
                 if target in self._feeding:
                     raise InputError(f"the input {target} has more than one source; keep one of them")
@@ -124,6 +117,12 @@ class Wiring:
         ends: dict[bool, Pin] = {}
         for side in ("start", "end"):
             label, name = _element(element, side), element.get(f"{side}Connector")
+            if element.get(f"{side}Indices") is not None:
+                raise InputError(
+                    f"the connection of {_end(node, element, 'start')} to {_end(node, element, 'end')} has "
+                    f"{side}Indices, and the standard does not say whether those count from 0 or 1; connect the whole "
+                    "arrays"
+                )
             if label is not None and label not in node.parts:
                 raise InputError(
                     f"a connection names the component '{shortened(label)}'{did_you_mean(label, node.parts)}"
