@@ -286,7 +286,7 @@ def test_fmpy_and_the_lines_of_the_page_give_our_trajectory(
 def test_fmpy_alone_cannot_begin_a_heart(cosim: Cosim, tmp_path: Path) -> None:
     # If this fails, FMPy has learned to exchange initial values: then shorten the page.
     package = _package(cosim, _SCENARIOS / "cell.yaml", tmp_path, "run.stop_ms=30")
-    with pytest.raises(Exception, match="fmi2ExitInitializationMode failed with status 3"):
+    with pytest.raises(Exception, match="fmi2SetReal failed with status 3"):
         simulation.simulate_ssp(str(package), stop_time=0.03, step_size=0.001)
 
 
