@@ -22,7 +22,7 @@ def write_container(system: System, folder: Path) -> Path:
     InvalidInput
         If a link transforms its values.
     """
-    system.require_plain_links("fmu-manipulation-toolbox")
+    system.require_plain("fmu-manipulation-toolbox")
     # The tool knows an FMU by a file name: a second instance is given one of its own, and the file that it stands for.
     names = {component.name: _instance(system, component) for component in system.components}
     system.copy_fmus(folder)

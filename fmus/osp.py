@@ -33,7 +33,7 @@ def write_osp(system: System, folder: Path) -> Path:
     InvalidInput
         If a link transforms its values, or two FMUs that differ have one model name, by which libcosim finds groups.
     """
-    system.require_plain_links("libcosim")
+    system.require_plain("libcosim")
     models: dict[str, Component] = {}
     for component in system.components:
         first = models.setdefault(component.description.modelName, component)

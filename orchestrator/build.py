@@ -34,12 +34,6 @@ class Built:
         """The scenario's units and connections."""
         return system_of(self.scenario, self.base, self.mesh, self.fmus)
 
-    @cached_property
-    def held_system(self) -> System:
-        """The same for masters of which it is known that they set inputs at a step's begin and hold them."""
-        coupling = self.scenario.coupling.model_copy(update={"interpolation": "hold"})
-        return system_of(self.scenario.model_copy(update={"coupling": coupling}), self.base, self.mesh, self.fmus)
-
 
 def build_fmus(scenario: Scenario, base: Path, folder: Path, may_be_none: bool = False, fmi: int = 2) -> Built:
     """Build the FMU of every unit of `scenario`, of FMI 2.0 or 3.0, into `folder`; its paths are relative to `base`.
@@ -70,13 +64,13 @@ def write_package(built: Built) -> Path:
 
 
 def write_osp_files(built: Built) -> Path:
-    """Write the system structure for libcosim, and what belongs to it: a unit that ramped inputs there would lag."""
-    return _written(built, lambda: write_osp(built.held_system, built.folder))
+    """Write the system structure for libcosim, and what belongs to it."""
+    return _written(built, lambda: write_osp(built.system, built.folder))
 
 
 def write_container_file(built: Built) -> Path:
-    """Write what fmucontainer makes one FMU of; its inputs are held, as libcosim's are."""
-    return _written(built, lambda: write_container(built.held_system, built.folder))
+    """Write what fmucontainer makes one FMU of."""
+    return _written(built, lambda: write_container(built.system, built.folder))
 
 
 def _written(built: Built, write: Callable[[], Path]) -> Path:

@@ -91,7 +91,8 @@ class Fmi3Calls:
         """See Calls."""
         # An enumeration is set as an Int64 (FMI 3.0, section 2.4.4).
         kind = "Int64" if variable.type == "Enumeration" else variable.type
-        getattr(self._slave, f"set{kind}")([variable.valueReference], [value] * prod(variable.shape))
+        values = value if isinstance(value, list) else [value] * prod(variable.shape)
+        getattr(self._slave, f"set{kind}")([variable.valueReference], values)
 
     def step(self, time: float, size: float) -> None:
         """See Calls."""

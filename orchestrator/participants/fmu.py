@@ -18,6 +18,7 @@ from fmpy.fmi1 import FMICallException
 from ...fmus.annotations import FALLBACKS, IMPLEMENTATION
 from ..activity import doing
 from ..errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
+from ..quoting import quoted
 from .fmi2_calls import Fmi2Calls
 from .fmi3_calls import Fmi3Calls
 from .fmu_digest import Digest, read_digest
@@ -91,7 +92,7 @@ class Calls(Protocol):
         """Let inputs run over the next step, where the FMU asks for what they are inside of it."""
 
     def set_start(self, variable: Any, value: Any) -> None:
-        """Set a variable of any type, an array to one value everywhere; `variable` is FMPy's."""
+        """Set a variable of any type, an array to one value everywhere or to a list; `variable` is FMPy's."""
 
     def step(self, time: float, size: float) -> None:
         """Advance from `time` by `size`; ParticipantTerminated if the FMU asks for the end of the simulation."""
@@ -469,7 +470,7 @@ class FmuParticipant:
                 self._call(partial(_set_start, declared[name], value))
             except ParticipantError as error:
                 kind = declared[name].type
-                raise InputError(f"{what} '{name}' of type {kind} cannot be {value!r}: {error}") from None
+                raise InputError(f"{what} '{name}' of type {kind} cannot be {quoted(value)}: {error}") from None
 
 
 def _abilities(declared: Any, memoryless: bool) -> Abilities:

@@ -8,7 +8,7 @@ and system packages read all FMUs through here.
 import gc
 import io
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
@@ -124,7 +124,12 @@ def read_description(file: FmuFile) -> Description:
                     element.get("name"): element.get("relativeQuantity") in _TRUE
                     for element in root.iterfind("ModelVariables/*[@relativeQuantity]")
                 }
-                variables = [_of_fmpy(variable, relative) for variable in head.modelVariables]
+                intermediate = {
+                    element.get("name")
+                    for element in root.iterfind("ModelVariables/*[@intermediateUpdate]")
+                    if element.get("intermediateUpdate") in _TRUE
+                }
+                variables = [_of_fmpy(variable, relative, intermediate) for variable in head.modelVariables]
         except InputError:
             raise
         # FMPy raises plain Exceptions.
@@ -236,7 +241,7 @@ def _variable(element: Any, types: Mapping[str, Any]) -> Variable:
     )
 
 
-def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
+def _of_fmpy(variable: Any, relative: Mapping[str, bool], intermediate: Set[str]) -> Variable:
     kind = variable.declaredType
     return Variable(
         variable.name,
@@ -251,7 +256,8 @@ def _of_fmpy(variable: Any, relative: Mapping[str, bool]) -> Variable:
         # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
         relative.get(variable.name, bool(kind is not None and kind.relativeQuantity)),
         kind,
-        bool(variable.intermediateUpdate),
+        # And this one FMPy never looks for.
+        variable.name in intermediate,
     )
 
 

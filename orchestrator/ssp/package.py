@@ -1,4 +1,4 @@
-"""Scenarios from system packages (SSP 1.0): this project's own, which say how they are coupled, and those of others."""
+"""Scenarios from system packages (SSP 1.0, 2.0): this project's own, which say how they are coupled, and others'."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence

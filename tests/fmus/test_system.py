@@ -43,7 +43,7 @@ def heart(fmus: dict[str, Path], tiny: Mesh) -> System:
     parts = (
         component("fibers", "fiber_generator"),
         component("electro", "electrophysiology", stretch_conductance=0.1, refine=0),
-        component("stress", "active_stress", input_interpolation="linear"),
+        component("stress", "active_stress", time_integration="exact"),
         component("mechanics", "mechanics"),
         component("idle_stress", "active_stress"),
     )
@@ -96,7 +96,7 @@ def test_osp_gives_parameters_in_their_types(heart: System, tmp_path: Path) -> N
     assert given == {
         ("electro", "stretch_conductance"): ("Real", "0.1"),
         ("electro", "refine"): ("Integer", "0"),
-        ("stress", "input_interpolation"): ("String", "linear"),
+        ("stress", "time_integration"): ("String", "exact"),
     }
 
 
