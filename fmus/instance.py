@@ -4,7 +4,7 @@ What the wrapper makes of exceptions is said in `slave`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import inf
+from math import inf, prod
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ from ..units.phase import Phase
 from ..units.registry import UNITS
 from ..units.variable import Causality
 from .clock import Clock
+from .coordinates import Coordinates, coordinates
 from .layout import TIME, Run, layout
 from .references import ArrayReferences, Piece, References, ScalarReferences
 from .saved_state import SavedState
@@ -38,8 +39,11 @@ class UnitInstance:
         self.unit = UNITS[name](mesh)
         self.clock = Clock()
         self._fmi = fmi
-        kind = ScalarReferences if fmi == 2 else ArrayReferences
-        self._references: References = kind(name, layout(type(self.unit), mesh))
+        kind = type(self.unit)
+        runs = layout(kind, mesh)
+        self._references: References = (
+            ScalarReferences(name, runs) if fmi == 2 else ArrayReferences(name, (*runs, *coordinates(kind, mesh)))
+        )
         self._staged: dict[str, FloatArray] = {}
         self._read: dict[str, FloatArray] = {}
         # For the next step: time derivatives of inputs in 1/s (FMI 2.0), or their values at its end (FMI 3.0).
@@ -72,6 +76,12 @@ class UnitInstance:
                 "and its termination only"
             )
 
+    def prepare_step(self, time: float, size: float) -> None:
+        """Before an intermediate update gives inputs at the end of a step; InvalidInput if there is no such step."""
+        self.check_step(time, size)
+        # What was given for a step that was not taken then.
+        self._ends = {}
+
     def do_step(self, time: float, size: float) -> None:
         """fmi2DoStep and fmi3DoStep; StepFailure leaves the state as it was."""
         self.check_step(time, size)
@@ -101,6 +111,8 @@ class UnitInstance:
         """
         pieces = self._pieces(fmi_type, references, len(values))
         for piece in pieces:
+            if piece.run is TIME:
+                raise InvalidInput("'time' can be read only: it moves with the steps")
             variable = self.unit.settable(piece.run.variable.name)
             if variable.causality is Causality.PARAMETER:
                 variable.checked(values[piece.at].tolist()[0])
@@ -124,7 +136,10 @@ class UnitInstance:
 
     def set_texts(self, references: np.ndarray, values: Sequence[str]) -> None:
         """fmi2SetString and fmi3SetString: parameters that choose between named options."""
-        chosen = dict(zip(self._texts(references), values, strict=True))
+        names = self._texts(references)
+        if len(names) != len(values):
+            raise InvalidInput(f"{len(values)} texts were given for {len(names)} variables ({', '.join(names)})")
+        chosen = dict(zip(names, values, strict=True))
         for name, value in chosen.items():
             self.unit.settable(name).checked(value)
         self._forget_foreseen()
@@ -218,6 +233,8 @@ class UnitInstance:
         """fmi2SetFMUstate and fmi3SetFMUState."""
         if not isinstance(state, SavedState):
             raise InvalidInput("the state that was given is none of this FMU")
+        if any(values.shape != (prod(self._shape(name)),) for name, values in state.derivatives.items()):
+            raise InvalidInput(f"the input derivatives of the state do not fit unit '{self.unit.name}'")
         self.unit.set_state(state.snapshot)
         self._forget()
         self.clock, self._derivatives = state.clock, dict(state.derivatives)
@@ -225,12 +242,16 @@ class UnitInstance:
     # --- inside -------------------------------------------------------------------------------------------------------
 
     def _pieces(self, fmi_type: str, references: np.ndarray, count: int | None) -> Sequence[Piece]:
-        """What `references` mean; all have to be of the type that the caller took them for."""
-        pieces = self._references.pieces(references, count)
+        """What `references` mean: of the type that the caller took them for, with `count` values if that is known."""
+        pieces = self._references.pieces(references)
         for piece in pieces:
             own = piece.run.type_in(self._fmi)
             if own != fmi_type:
                 raise InvalidInput(f"'{piece.run.variable.name}' is of the type {own}, not {fmi_type}")
+        size = sum(piece.size for piece in pieces)
+        if count not in (None, size):
+            names = ", ".join(f"'{piece.run.variable.name}'" for piece in pieces)
+            raise InvalidInput(f"{count} values were given or asked for; {names} have {size}")
         return pieces
 
     def _require_interpolation(self, capability: str) -> None:
@@ -283,7 +304,7 @@ class UnitInstance:
     def _texts(self, references: np.ndarray) -> list[str]:
         """The variables of `references`, one by one, which have to be texts."""
         ones = (references[place : place + 1] for place in range(len(references)))
-        return [self._pieces("String", one, 1)[0].run.variable.name for one in ones]
+        return [self._pieces("String", one, None)[0].run.variable.name for one in ones]
 
     def _advance(self, call: Callable[[], _Result]) -> _Result:
         self._flush()
@@ -301,6 +322,8 @@ class UnitInstance:
     def _values(self, run: Run, warnings: list[str]) -> np.ndarray:
         if run is TIME:
             return np.array([self.clock.time])
+        if isinstance(run, Coordinates):
+            return run.values
         name = run.variable.name
         if name not in self._read:
             value = self._output(name, warnings) if run.variable.causality is Causality.OUTPUT else self.unit.get(name)

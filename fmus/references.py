@@ -23,12 +23,17 @@ class Piece(NamedTuple):
     places: np.ndarray | None
     at: slice | np.ndarray
 
+    @property
+    def size(self) -> int:
+        """How many values."""
+        return self.run.size if self.places is None else len(self.places)
+
 
 class References(Protocol):
     """The value references of one version of FMI; InvalidInput for those that do not exist."""
 
-    def pieces(self, references: np.ndarray, count: int | None = None) -> Sequence[Piece]:
-        """What `references` mean, of which `count` values cross; None where they may be any number."""
+    def pieces(self, references: np.ndarray) -> Sequence[Piece]:
+        """What `references` mean."""
 
 
 class ScalarReferences:
@@ -42,8 +47,8 @@ class ScalarReferences:
         # Compared with at every call: in the type in which they come, and made once.
         self._ranges = {key: np.arange(key[0], sum(key), dtype=np.uint32) for key in self._whole}
 
-    def pieces(self, references: np.ndarray, count: int | None = None) -> Sequence[Piece]:
-        """See References; there are as many values as references."""
+    def pieces(self, references: np.ndarray) -> Sequence[Piece]:
+        """See References."""
         if not len(references):
             return []
         key = int(references[0]), len(references)
@@ -66,7 +71,7 @@ class ArrayReferences:
         self._unit = unit
         self._runs = {run.reference: run for run in (TIME, *runs)}
 
-    def pieces(self, references: np.ndarray, count: int | None = None) -> Sequence[Piece]:
+    def pieces(self, references: np.ndarray) -> Sequence[Piece]:
         """See References."""
         found, end = [], 0
         for reference in references.tolist():
@@ -75,7 +80,4 @@ class ArrayReferences:
             run = self._runs[reference]
             found.append(Piece(run, None, slice(end, end + run.size)))
             end += run.size
-        if count is not None and count != end:
-            names = ", ".join(f"'{piece.run.variable.name}'" for piece in found)
-            raise InvalidInput(f"{count} values were given or asked for; {names} of unit '{self._unit}' have {end}")
         return found

@@ -58,7 +58,7 @@ class Slave:
 
     def prepare_step(self, time: float, size: float) -> Answer:
         """Before the intermediate update of a step: whether there may be such a step."""
-        return _answered(lambda: self._instance.check_step(time, size))
+        return _answered(lambda: self._instance.prepare_step(time, size))
 
     def do_step(self, time: float, size: float) -> Answer:
         """fmi2DoStep and fmi3DoStep."""

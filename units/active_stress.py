@@ -25,11 +25,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import exprel
 
+from .active_stress_derivative import ActiveStressDerivative, held_slope, ramped_slope
 from .arrays import FloatArray, frozen
+from .differentiable import Differentiable
 from .errors import StepFailure
 from .mesh.averages import around_nodes
 from .snapshot import State
-from .unit import Unit
+from .taken import Taken
 from .variable import VOLTAGE, Causality, Location, Record, Variable, parameter
 
 _KPA_PER_MPA = 1000.0
@@ -67,18 +69,29 @@ class Tension:
 
     def rate(self, potential: FloatArray) -> FloatArray:
         """ε in 1/ms at the potentials (mV)."""
-        exponent = -self.delay_slope_per_mV * (potential - self.tension_threshold_potential_mV)
-        # exp(-exp(x)) is 0 to the last bit from x = 7 on; capping x keeps exp from overflowing far below threshold.
-        switch = np.exp(-np.exp(np.minimum(exponent, 50.0)))
-        jump = self.fast_rate_per_ms - self.slow_rate_per_ms
-        return np.asarray(self.slow_rate_per_ms + (-jump if self.delay_function == "seed" else jump) * switch)
+        return np.asarray(self.slow_rate_per_ms + self._jump * np.exp(-np.exp(self._exponent(potential))))
+
+    def rate_slope(self, potential: FloatArray) -> FloatArray:
+        """dε/dΦ in 1/(ms mV) at the potentials (mV)."""
+        exponent = self._exponent(potential)
+        return np.asarray(self._jump * self.delay_slope_per_mV * np.exp(exponent - np.exp(exponent)))
 
     def target(self, potential: FloatArray) -> FloatArray:
         """k(Φ − Φ_r) in MPa."""
         return self.tension_per_potential_MPa_per_mV * (potential - self.tension_rest_potential_mV)
 
+    @property
+    def _jump(self) -> float:
+        jump = self.fast_rate_per_ms - self.slow_rate_per_ms
+        return -jump if self.delay_function == "seed" else jump
 
-class ActiveStress(Unit):
+    def _exponent(self, potential: FloatArray) -> FloatArray:
+        exponent = -self.delay_slope_per_mV * (potential - self.tension_threshold_potential_mV)
+        # exp(-exp(x)) is 0 to the last bit from x = 7 on; capping x keeps exp from overflowing far below threshold.
+        return np.minimum(exponent, 50.0)
+
+
+class ActiveStress(Differentiable):
     """Active stress by a potential-dependent first-order delay."""
 
     name = "active_stress"
@@ -167,6 +180,17 @@ class ActiveStress(Unit):
             )
         return {"tension": tension, "active_stress": active_stress, **self._reference(inputs)}
 
+    def derivative(self, taken: Taken, state: State) -> ActiveStressDerivative:
+        """See Differentiable; initially there is no active stress, whatever the inputs."""
+        eta = self._tension.length_dependence
+        return ActiveStressDerivative(
+            _KPA_PER_MPA * (self._slope(taken) if taken.before else np.zeros(self.mesh.nodes)),
+            np.ones(self.mesh.nodes) * self._length_factor(taken.inputs["stretch"]),
+            _KPA_PER_MPA * eta * state["tension"],
+            eta,
+            self._average if eta else None,
+        )
+
     def output(self, name: str, state: State) -> FloatArray:
         """Active stress and its stiffness in kPa, shape (nodes,), and the stretch they hold at, shape (elements,)."""
         if name == "active_stiffness":
@@ -174,6 +198,20 @@ class ActiveStress(Unit):
         if name == "reference_stretch" and not self._tension.length_dependence:
             return frozen(np.zeros(self.mesh.elements))
         return state[name]
+
+    def _slope(self, taken: Taken) -> FloatArray:
+        """How the tension at the end of a step follows the potential, in MPa/mV, shape (nodes,)."""
+        law, tension = self._tension, taken.before["tension"]
+        potentials = taken.begin["potential"], taken.inputs["potential"]
+        first, last = (law.target(potential) for potential in potentials)
+        earlier, decay = (law.rate(potential) * taken.step for potential in potentials)
+        earlier_slope, decay_slope = (law.rate_slope(potential) * taken.step for potential in potentials)
+        target_slope = law.tension_per_potential_MPa_per_mV
+        if law.time_integration == "forward_euler":
+            return decay_slope * (last - tension) + decay * target_slope
+        if np.array_equal(*potentials):
+            return held_slope(tension, last, decay, target_slope, decay_slope)
+        return ramped_slope(tension, (first, last), (earlier, decay), target_slope, (earlier_slope, decay_slope))
 
     def _reference(self, inputs: State) -> dict[str, FloatArray]:
         return {"reference_stretch": inputs["stretch"]} if self._tension.length_dependence else {}

@@ -10,3 +10,8 @@ class Phase(Enum):
     INITIALIZATION = "in initialization mode"
     STEPPING = "initialized"
     TERMINATED = "terminated"
+
+    @property
+    def initialized(self) -> bool:
+        """Whether there is a state, and what `Unit.prepare` makes."""
+        return self in (Phase.STEPPING, Phase.TERMINATED)

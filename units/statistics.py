@@ -32,12 +32,32 @@ class Statistic(Variable):
 
     def __call__(self, values: FloatArray) -> FloatArray:
         """The number, shape (), of the field's `values`, shape (places,) or (places, components)."""
-        numbers = values if self.source.components == 1 else np.linalg.norm(values, axis=1)
+        numbers = self._numbers(values)
         if self.source.missing is not None:
             numbers = numbers[numbers != self.source.missing]
             if not numbers.size:
                 return frozen(self.source.missing)
         return frozen(numbers.mean() if self.kind is Kind.MEAN else numbers.max())
+
+    def gradient(self, values: FloatArray) -> FloatArray:
+        """Its derivative by every one of the field's `values`, in their shape.
+
+        A maximum follows the first place that holds it; a vector of no length has no direction, and counts as at rest.
+        """
+        numbers = self._numbers(values)
+        counted = np.ones(numbers.shape, dtype=bool) if self.source.missing is None else numbers != self.source.missing
+        slopes = np.zeros_like(numbers)
+        if self.kind is Kind.MEAN and counted.any():
+            slopes[counted] = 1.0 / np.count_nonzero(counted)
+        elif counted.any():
+            slopes[np.where(counted, numbers, -np.inf).argmax()] = 1.0
+        if self.source.components == 1:
+            return slopes
+        lengths = np.where(numbers > 0.0, numbers, 1.0)
+        return np.asarray((slopes / lengths)[:, None] * values)
+
+    def _numbers(self, values: FloatArray) -> FloatArray:
+        return values if self.source.components == 1 else np.linalg.norm(values, axis=1)
 
 
 def statistics(fields: tuple[Variable, ...]) -> Iterator[Statistic]:

@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, frozen
 from .errors import CallOrderError, InvalidInput, StepFailure
+from .field import checked_field
 from .mesh import Mesh
 from .phase import Phase
 from .snapshot import Snapshot, State
 from .statistics import Statistic, statistics
+from .taken import Taken
 from .variable import Causality, Location, Scalar, Variable, parameters_of
 
 Group = TypeVar("Group")
@@ -69,6 +71,8 @@ class Unit(ABC):
     memoryless: ClassVar[bool] = False
     #: Whether inputs may run over a step, from the values set to those given for its end.
     interpolates: ClassVar[bool] = False
+    #: Whether there are derivatives of its outputs by its inputs (`differentiable`).
+    differentiable: ClassVar[bool] = False
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -76,6 +80,8 @@ class Unit(ABC):
         self._parameters: dict[str, Scalar] = {}
         self._inputs: dict[str, FloatArray] = {}
         self._state: dict[str, FloatArray] = {}
+        # Of a unit that has derivatives, what the state was computed from.
+        self._taken: Taken | None = None
         # The parameters and fixed inputs that `prepare` was called with last; None before.
         self._prepared: tuple[dict[str, Scalar], dict[str, FloatArray]] | None = None
         # The state that the initialisation would end in as things are, if somebody wanted to know.
@@ -174,6 +180,7 @@ class Unit(ABC):
         with self._naming_parameters():
             self._prepare()
             self._state = self._sound(self.initial(self._inputs))
+        self._taken = Taken.initially(self._inputs) if self.differentiable else None
         self.phase = Phase.STEPPING
 
     def do_step(self, time: float, step: float, ends: Mapping[str, ArrayLike] | None = None) -> None:
@@ -194,9 +201,10 @@ class Unit(ABC):
         if not (np.isfinite(time) and np.isfinite(step) and step >= 0.0):
             raise InvalidInput(f"unit '{self.name}' cannot step from {time} s by {step} s: both finite, the step >= 0")
         inputs = self._inputs | self._ends(ends) if ends else self._inputs
+        taken = Taken(self._state, self._inputs, inputs, time * _MS_PER_S, step * _MS_PER_S)
         with self._naming_parameters():
-            state = self.advance(self._state, self._inputs, inputs, time * _MS_PER_S, step * _MS_PER_S)
-            self._state = self._sound(state)
+            self._state = self._sound(self.advance(taken.before, taken.begin, inputs, taken.time, taken.step))
+        self._taken = taken if self.differentiable else None
 
     def terminate(self) -> None:
         """End the life of the instance; only `get` and `reset` remain."""
@@ -209,6 +217,7 @@ class Unit(ABC):
         self._parameters = {}
         self._inputs = {}
         self._state = {}
+        self._taken = None
         self._foreseen = None
 
     # --- values -------------------------------------------------------------------------------------------------------
@@ -295,11 +304,21 @@ class Unit(ABC):
         """The unit's values of one parameter group, as that frozen dataclass."""
         return group(**{variable.name: self.get(variable.name) for variable in parameters_of(group)})
 
+    def directional_derivative(self, seed: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
+        """See `differentiable.Differentiable`; InvalidInput, since this unit has no derivatives."""
+        raise InvalidInput(f"unit '{self.name}' gives no derivatives of its outputs")
+
+    def adjoint_derivative(self, seed: Mapping[str, ArrayLike]) -> dict[str, FloatArray]:
+        """See `differentiable.Differentiable`; InvalidInput, since this unit has no derivatives."""
+        raise InvalidInput(f"unit '{self.name}' gives no derivatives of its outputs")
+
     # --- rollback -----------------------------------------------------------------------------------------------------
 
     def get_state(self) -> Snapshot:
         """All that `set_state` needs to return here exactly. Costs references only: no array is copied."""
-        return Snapshot(self.name, self.mesh.fingerprint, self.phase, self._parameters, self._inputs, dict(self._state))
+        return Snapshot(
+            self.name, self.mesh.fingerprint, self.phase, self._parameters, self._inputs, dict(self._state), self._taken
+        )
 
     def set_state(self, snapshot: Snapshot) -> None:
         """Go back (or forth) to `snapshot`, in any phase: the next step gives the same bits as it gave from there.
@@ -312,36 +331,23 @@ class Unit(ABC):
         InvalidInput
             If the snapshot is of another unit or of another mesh; everything is then as before the call.
         """
-        if snapshot.unit != self.name:
-            raise InvalidInput(f"a state of unit '{snapshot.unit}' was given to unit '{self.name}'")
-        if snapshot.mesh != self.mesh.fingerprint:
-            raise InvalidInput(f"the state given to unit '{self.name}' belongs to another mesh")
-        declared = _declared(type(self))
-        inputs = {name: declared.get(name) for name in snapshot.inputs}
-        for name, variable in inputs.items():
-            if (
-                variable is None
-                or variable.causality is not Causality.INPUT
-                or snapshot.inputs[name].shape != variable.shape(self.mesh)
-            ):
-                raise InvalidInput(f"the input arrays of the state do not fit unit '{self.name}'")
+        known = self._state if snapshot.parameters == self._parameters else {}
+        snapshot.check_fits(self.name, self.mesh, self.inputs(), known)
         parameters = {name: self._parameter(name).checked(value) for name, value in snapshot.parameters.items()}
-        if snapshot.state and self._state and parameters == self._parameters:
-            shapes = [{name: value.shape for name, value in state.items()} for state in (snapshot.state, self._state)]
-            if shapes[0] != shapes[1]:
-                raise InvalidInput(f"the state arrays of the state do not fit unit '{self.name}'")
-        before = self.phase, self._parameters, self._inputs, self._state
+        before = self._parameters, self._inputs
         self._parameters, self._inputs = parameters, dict(snapshot.inputs)
-        if snapshot.phase in (Phase.STEPPING, Phase.TERMINATED) and not self._is_prepared():
+        if snapshot.phase.initialized and not self._is_prepared():
             try:
                 with self._naming_parameters():
                     self._prepare()
             except BaseException:
-                self.phase, self._parameters, self._inputs, self._state = before
-                if self.phase in (Phase.STEPPING, Phase.TERMINATED):
+                self._parameters, self._inputs = before
+                self._foreseen = None
+                if self.phase.initialized:
                     self._prepare()
                 raise
-        self.phase, self._state, self._foreseen = snapshot.phase, dict(snapshot.state), None
+        self.phase, self._state, self._taken = snapshot.phase, dict(snapshot.state), snapshot.taken
+        self._foreseen = None
 
     serialize = staticmethod(Snapshot.to_bytes)
     deserialize = staticmethod(Snapshot.from_bytes)
@@ -463,17 +469,7 @@ class Unit(ABC):
         return frozen(np.full(variable.shape(self.mesh), variable.stand_in or variable.start))
 
     def _field(self, variable: Variable, value: ArrayLike | str) -> FloatArray:
-        try:
-            array = frozen(value)  # type: ignore[arg-type]
-        except (TypeError, ValueError) as error:
-            raise InvalidInput(
-                f"input '{variable.name}' of unit '{self.name}' takes real numbers, not this: {error}"
-            ) from None
-        expected = variable.shape(self.mesh)
-        if array.shape != expected:
-            raise InvalidInput(
-                f"input '{variable.name}' of unit '{self.name}' got shape {array.shape}, expected {expected}"
-            )
+        array = checked_field(variable, value, self.mesh, self.name)
         self.check_values(variable, array)
         return array
 

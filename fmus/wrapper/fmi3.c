@@ -154,7 +154,7 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentComm
     if (eventHandlingNeeded != NULL) *eventHandlingNeeded = fmi3False;
     if (terminateSimulation != NULL) *terminateSimulation = fmi3False;
     if (earlyReturn != NULL) *earlyReturn = fmi3False;
-    if (!ready(&own->shared)) return fmi3Error;
+    if (own == NULL || !ready(&own->shared)) return fmi3Error;
     double time = currentCommunicationPoint, step = communicationStepSize;
     Status status = OK;
     if (own->update != NULL && own->intermediate_count > 0) {

@@ -4,14 +4,13 @@ import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from cardiac_cosim.fmus import wrapper
 from cardiac_cosim.fmus.build import build_fmu
 from cardiac_cosim.units.geometry import registry
 from cardiac_cosim.units.mesh import Mesh
@@ -33,7 +32,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "eikonal": {"activation_time_map": "seed", "diffusion_anisotropic_mm2_per_ms": 0.3},
     "local_mechanics": {"hold": "isometric", "shear_modulus_MPa": 0.3},
     "mechanics": {"newton_iterations": 30, "shear_modulus_MPa": 0.3},
-    "mass": {"k": 5.0, "k_c": 20.0, "c_c": 0.5, "x_start": 1.0, "input_interpolation": "linear"},
+    "mass": {"k": 5.0, "k_c": 20.0, "c_c": 0.5, "x_start": 1.0},
     "response": {"gain": -0.7, "delay_rate_per_ms": 0.4, "rate_gain_ms": 0.3, "disturbance": 0.2},
 }
 
@@ -82,12 +81,24 @@ class Case:
     parameters: dict[str, Any]
     fixed: Fields
     inputs: list[Fields]
-    #: Times and sizes of the steps in s: of different lengths, a zero one among them.
-    steps: tuple[tuple[float, float], ...] = ((0.0, 1e-3), (1e-3, 0.0), (1e-3, 2.5e-3), (3.5e-3, 1e-3))
+    #: Times and sizes of the steps in s, which are of different lengths.
+    steps: tuple[tuple[float, float], ...] = ((0.0, 1e-3), (1e-3, 0.5e-3), (1.5e-3, 2.5e-3), (4e-3, 1e-3))
     expected: list[Fields] = field(default_factory=list)
 
     def first(self) -> Fields:
         return self.fixed | self.inputs[0]
+
+    def compare(self, seen: Mapping[str, Any], number: int) -> None:
+        """Outputs after so many steps are those of the unit, to the last bit."""
+        assert set(seen) == set(self.expected[number])
+        for name, values in self.expected[number].items():
+            np.testing.assert_array_equal(np.array(seen[name]), values.ravel(), err_msg=name)
+
+    def run(self, driver: Any, first: int = 0) -> None:
+        """The steps from number `first` on, each compared with the unit's own."""
+        for number in range(first, len(self.steps)):
+            assert driver.step(*self.steps[number], self.inputs[number]) == 0, driver.errors()
+            self.compare(driver.outputs(), number + 1)
 
 
 def _native(case: Case) -> list[Fields]:
@@ -142,31 +153,43 @@ def cases(tiny: Mesh) -> dict[str, Case]:
     return _cases(tiny)
 
 
-@pytest.fixture(scope="session", params=["own", "pythonfmu"])
-def binary(request: pytest.FixtureRequest) -> str:
-    """Whose wrapper the FMUs have that are built in a test; ours is compiled wherever the tests run."""
-    return str(request.param)
+@pytest.fixture(scope="session", params=[2, 3])
+def fmi(request: pytest.FixtureRequest) -> int:
+    """The version of FMI: what is tested with it holds for both."""
+    return int(request.param)
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None, Any, Any]:
-    """A test of pythonfmu's binary, and its fixtures, build FMUs as if there were no other; no other test does."""
-    assert wrapper.library() is not None
-    with pytest.MonkeyPatch.context() as patch:
-        if isinstance(item, pytest.Function) and _parameters(item).get("binary") == "pythonfmu":
-            patch.setattr(wrapper, "library", lambda: None)
-        return (yield)
+@pytest.fixture(params=list(UNITS))
+def case(request: pytest.FixtureRequest, cases: dict[str, Case]) -> Case:
+    """Each unit's."""
+    return cases[request.param]
 
 
-def _parameters(item: pytest.Function) -> dict[str, Any]:
-    return item.callspec.params if hasattr(item, "callspec") else {}
+@pytest.fixture(params=["electrophysiology", "active_stress", "mechanics"])
+def stepping(request: pytest.FixtureRequest, cases: dict[str, Case]) -> Case:
+    """Those of the units that change in a step and have fields."""
+    return cases[request.param]
 
 
 @pytest.fixture(scope="session")
-def fmus(tiny: Mesh, binary: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The FMUs of all units on the tiny mesh."""
+def fmus(tiny: Mesh, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The FMI 2.0 FMUs of all units on the tiny mesh."""
     folder = tmp_path_factory.mktemp("tiny")
     return {name: build_fmu(unit, tiny, folder / f"{name}.fmu") for name, unit in UNITS.items()}
+
+
+@pytest.fixture(scope="session")
+def fmus3(tiny: Mesh, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The FMI 3.0 FMUs of all units on the tiny mesh."""
+    folder = tmp_path_factory.mktemp("tiny3")
+    return {name: build_fmu(unit, tiny, folder / f"{name}.fmu", fmi=3) for name, unit in UNITS.items()}
+
+
+@pytest.fixture(scope="session")
+def packed(fmi: int, request: pytest.FixtureRequest) -> dict[str, Path]:
+    """The FMUs of all units on the tiny mesh, of the version that is tested."""
+    fmus: dict[str, Path] = request.getfixturevalue("fmus" if fmi == 2 else "fmus3")
+    return fmus
 
 
 @pytest.fixture(scope="session")
@@ -184,16 +207,22 @@ def baseline_fmus(baseline: Mesh, tmp_path_factory: pytest.TempPathFactory) -> d
 
 @pytest.fixture
 def drive() -> Iterator[Callable[..., Any]]:
-    """Instantiate an FMU with the driver; freed when the test ends."""
+    """Instantiate an FMU with the driver of its version; freed when the test ends."""
     drivers = []
 
-    def make(path: Path, instance: str = "driven") -> Any:
-        drivers.append(_fmi_driver.Driver(path, instance))
+    def make(path: Path, instance: str = "driven", **rest: Any) -> Any:
+        drivers.append(_fmi_driver.drive(path, instance, **rest))
         return drivers[-1]
 
     yield make
     for driver in drivers:
         driver.close()
+
+
+@pytest.fixture
+def make(packed: dict[str, Path], drive: Callable[..., Any]) -> Callable[..., Any]:
+    """Instantiate the FMU of a unit on the tiny mesh, of the version that is tested."""
+    return lambda unit, *rest, **named: drive(packed[unit], *rest, **named)
 
 
 @pytest.fixture(scope="session")
@@ -207,7 +236,7 @@ class Blocker:
             raise ImportError("this process knows nothing of the project")
 sys.meta_path.insert(0, Blocker())
 sys.path.insert(0, {str(HERE)!r})
-from fmi_driver import Driver
+from fmi_driver import drive
 """
 
     def run(text: str, *arguments: Any, block: bool = True) -> str:

@@ -126,3 +126,34 @@ def test_who_does_not_read_them_does_not_pay(started: Any, two_chambers: Mesh) -
     assert Counting.asked == 0
     unit.get("active_stress_mean")
     assert Counting.asked == 1
+
+
+@pytest.mark.parametrize(
+    ("unit", "name"),
+    [("electrophysiology", "activation_time"), ("active_stress", "active_stress"), ("mechanics", "displacement")],
+)
+def test_gradients_are_those_of_differences_and_places_without_a_value_have_none(unit: str, name: str) -> None:
+    random = np.random.default_rng(5)
+    field = UNITS[unit].variable(name)
+    values = random.uniform(1.0, 2.0, (9, 3) if field.components == 3 else 9)
+    if field.missing is not None:
+        values[::2] = field.missing
+    change = random.uniform(-1.0, 1.0, values.shape)
+    for end in ("mean", "max"):
+        statistic = UNITS[unit].variable(f"{name}_{end}")
+        assert isinstance(statistic, Statistic)
+        gradient = statistic.gradient(values)
+        assert gradient.shape == values.shape
+        if field.missing is not None:
+            assert not gradient[::2].any()
+            change[::2] = 0.0
+            np.testing.assert_array_equal(statistic.gradient(np.full(9, field.missing)), 0.0)
+        difference = (statistic(values + 1e-6 * change) - statistic(values - 1e-6 * change)) / 2e-6
+        assert np.sum(gradient * change) == pytest.approx(float(difference), rel=1e-6)
+
+
+def test_where_nothing_is_displaced_the_mean_displacement_does_not_change() -> None:
+    # At rest it has a kink; its differences to both sides cancel.
+    statistic = Mechanics.variable("displacement_mean")
+    assert isinstance(statistic, Statistic)
+    np.testing.assert_array_equal(statistic.gradient(np.zeros((4, 3))), 0.0)

@@ -1,7 +1,7 @@
 """If these fail, no master can rely on the units: wrong input passes unnoticed, or a repeated step gives other bits."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from cardiac_cosim.units.fiber_generator import FiberGenerator
 from cardiac_cosim.units.mechanics import LocalMechanics, Mechanics
 from cardiac_cosim.units.mechanics.laws.registry import MATERIALS
 from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.phase import Phase
 from cardiac_cosim.units.registry import UNITS
 from cardiac_cosim.units.snapshot import Snapshot
 from cardiac_cosim.units.test_problems import Mass, Response
@@ -253,7 +254,6 @@ def test_calls_out_of_order_are_refused(scene: _Scene, mesh, alive) -> None:
     for early in (
         unit.exit_initialization_mode,
         unit.terminate,
-        unit.get_state,
         lambda: unit.do_step(0.0, 0.001),
         lambda: unit.get(scene.kind.outputs()[0].name),
         lambda: unit.get(scene.kind.outputs()[-1].name),
@@ -264,7 +264,6 @@ def test_calls_out_of_order_are_refused(scene: _Scene, mesh, alive) -> None:
     for early in (
         unit.enter_initialization_mode,
         unit.setup_experiment,
-        unit.get_state,
         lambda: unit.do_step(0.0, 0.0),
     ):
         with pytest.raises(CallOrderError, match="in initialization mode"):
@@ -282,7 +281,7 @@ def test_calls_out_of_order_are_refused(scene: _Scene, mesh, alive) -> None:
     shown = _outputs(ready)
     ready.terminate()
     assert _outputs(ready) == shown
-    for late in (ready.terminate, ready.get_state, lambda: ready.do_step(0.0, 0.001)):
+    for late in (ready.terminate, lambda: ready.do_step(0.0, 0.001)):
         with pytest.raises(CallOrderError, match="is terminated"):
             late()
 
@@ -303,7 +302,7 @@ def test_outputs_in_initialization_mode_are_those_after_it(scene: _Scene, mesh, 
     ready, unit = alive(scene), scene.kind(mesh)
     names = [variable.name for variable in scene.kind.outputs()]
     unit.enter_initialization_mode()
-    # Before any direction is known; who looks at these sees something finite, not what a wrong fibre would do.
+    # Before any direction is given.
     assert all(np.isfinite(unit.get(name)).all() for name in names)
     for variable in scene.kind.inputs():
         unit.set(variable.name, ready.get(variable.name))
@@ -323,20 +322,25 @@ def test_outputs_in_initialization_mode_are_those_after_it(scene: _Scene, mesh, 
 
 
 @each_unit
-def test_a_guessed_direction_is_no_given_one(scene: _Scene, mesh) -> None:
+def test_directions_that_nobody_gives_are_unit_vectors_along_the_axes(scene: _Scene, mesh, alive, started) -> None:
+    # A tool that simulates one unit by itself sets nothing.
     unit = scene.kind(mesh)
     unit.enter_initialization_mode()
-    for variable in scene.kind.outputs():
-        unit.get(variable.name)
-    if any(variable.guess for variable in scene.kind.inputs()) and scene.kind.name != "local_mechanics":
-        with pytest.raises(InvalidInput, match="no unit vector"):
-            unit.exit_initialization_mode()
+    for variable in scene.kind.inputs():
+        if variable.fixed:
+            axis = {"fiber": [1.0, 0.0, 0.0], "sheet": [0.0, 1.0, 0.0]}[variable.name]
+            np.testing.assert_array_equal(unit.get(variable.name), np.tile(axis, (mesh.elements, 1)))
+    unit.exit_initialization_mode()
+    _move(scene, unit, 2)
 
 
 @each_unit
-def test_experiment_starts_at_zero(scene: _Scene, mesh) -> None:
+def test_experiment_starts_at_zero_where_there_is_a_memory(scene: _Scene, mesh) -> None:
     unit = scene.kind(mesh)
     unit.setup_experiment(0.0, 0.5)
+    if scene.kind.memoryless:
+        unit.setup_experiment(0.1)
+        return
     with pytest.raises(InvalidInput, match=r"starts at t = 0 s, not at 0\.1 s"):
         unit.setup_experiment(0.1)
 
@@ -576,7 +580,8 @@ def test_reset_is_the_moment_after_construction(scene: _Scene, alive, started, d
     inputs = {}
     for variable in scene.kind.fields:
         if variable.causality is Causality.INPUT:
-            np.testing.assert_array_equal(unit.get(variable.name), variable.start)
+            start = np.full(variable.shape(unit.mesh), variable.stand_in or variable.start)
+            np.testing.assert_array_equal(unit.get(variable.name), start)
             if variable.fixed:
                 inputs[variable.name] = directions[variable.name]
     unit.instantiate(scene.parameters)
@@ -591,41 +596,195 @@ def test_reset_is_the_moment_after_construction(scene: _Scene, alive, started, d
     assert _bits(unit) == _bits(fresh)
 
 
+# --- states in every phase -------------------------------------------------------------------------------------------
+
+
+def _phases(scene: _Scene, unit: Unit) -> list[Snapshot]:
+    """Saved states of an instance with a parameter of its own, one in each phase, the later ones after two steps."""
+    other = scene.kind(unit.mesh)
+    other.instantiate(scene.parameters | {scene.other[0]: scene.other[1]})
+    other.setup_experiment()
+    states = [other.get_state()]
+    other.enter_initialization_mode()
+    for variable in scene.kind.inputs():
+        other.set(variable.name, unit.get(variable.name))
+    states.append(other.get_state())
+    other.exit_initialization_mode()
+    _move(scene, other, 2)
+    states.append(other.get_state())
+    other.terminate()
+    return [*states, other.get_state()]
+
+
+def _to_the_end(scene: _Scene, unit: Unit) -> list[dict[str, bytes]]:
+    """What an instance shows on the rest of its way, from whichever phase it is in."""
+    shown = []
+    if unit.phase is Phase.INSTANTIATED:
+        unit.enter_initialization_mode()
+    if unit.phase is Phase.INITIALIZATION:
+        shown.append(_outputs(unit))
+        unit.exit_initialization_mode()
+    if unit.phase is Phase.STEPPING:
+        shown.append(_outputs(unit))
+        _move(scene, unit, 2, first=2)
+        unit.terminate()
+    return [*shown, _outputs(unit)]
+
+
 @each_unit
-def test_state_of_another_unit_or_mesh_is_refused(scene: _Scene, alive) -> None:
-    unit = alive(scene)
-    before = _bits(unit)
-    saved = unit.get_state()
-    with pytest.raises(InvalidInput, match=f"'another' was given to unit '{scene.kind.name}'"):
-        unit.set_state(Snapshot("another", saved.mesh, saved.inputs, saved.state))
-    shorter = {name: value[:-1] if value.ndim else np.zeros(2) for name, value in saved.state.items()}
-    with pytest.raises(InvalidInput, match="state arrays of the state do not fit"):
-        unit.set_state(Snapshot(saved.unit, saved.mesh, saved.inputs, shorter))
-    with pytest.raises(InvalidInput, match="do not fit"):
-        unit.set_state(Snapshot(saved.unit, saved.mesh, saved.inputs, {}))
-    if saved.inputs:
-        with pytest.raises(InvalidInput, match="input arrays of the state do not fit"):
-            unit.set_state(Snapshot(saved.unit, saved.mesh, {}, saved.state))
-    assert _bits(unit) == before
+def test_a_state_of_any_phase_is_gone_back_to_from_any_other(scene: _Scene, alive) -> None:
+    # FMI allows it (FMI 2.0.4, section 4.2.4); parameters, inputs and the phase itself are then what they were.
+    states = _phases(scene, alive(scene))
+    assert [state.phase for state in states] == list(Phase)
+    reference = scene.kind(alive(scene).mesh)
+    ways = []
+    for state in states:
+        reference.set_state(state)
+        ways.append(_to_the_end(scene, reference))
+    for start in states:
+        for state, way in zip(states, ways, strict=True):
+            unit = alive(scene)
+            unit.set_state(start)
+            unit.set_state(Snapshot.from_bytes(state.to_bytes()))
+            assert unit.phase is state.phase
+            assert unit.get(scene.other[0]) == scene.other[1]
+            assert _to_the_end(scene, unit) == way
+
+
+@each_unit
+def test_a_state_brings_its_parameters_into_an_instance_with_others(scene: _Scene, alive) -> None:
+    # A run that went on with the parameters of the instance would look like any other.
+    name, value = scene.other
+    saver, other, fresh = alive(scene, **{name: value}), alive(scene), scene.kind(alive(scene).mesh)
+    for unit in (saver, other):
+        _move(scene, unit, 2)
+    saved, plain = saver.get_state(), other.get_state()
+    for unit in (other, fresh):
+        unit.set_state(saved)
+        assert unit.get(name) == value
+        assert _bits(unit) == _bits(saver)
+    for unit in (saver, other, fresh):
+        _move(scene, unit, 2, first=2)
+        assert _bits(unit) == _bits(saver)
+    # And back again.
+    undisturbed = alive(scene)
+    _move(scene, undisturbed, 4)
+    other.set_state(plain)
+    assert other.get(name) != value
+    _move(scene, other, 2, first=2)
+    assert _bits(other) == _bits(undisturbed)
 
 
 @pytest.mark.parametrize(
     "scene",
-    [
-        scene
-        for scene in _SCENES
-        if any(field.fixed for field in scene.kind.fields if field.name == "fiber") and scene.moving
-    ],
+    [scene for scene in _SCENES if any(item.fixed for item in scene.kind.inputs()) and scene.moving],
     ids=lambda scene: scene.kind.name,
 )
-def test_state_of_an_instance_with_other_fibres_is_refused(scene: _Scene, mesh, directions, alive, started) -> None:
-    # The operators are built from the fibres: going on from such a state cannot give the same bits.
-    turned = {name: -directions[name][:, [1, 2, 0]] for name in ("fiber", "sheet")}
-    names = [field.name for field in scene.kind.fields if field.name in turned]
-    other = started(scene.kind, mesh, scene.parameters, **{name: turned[name] for name in names})
-    _move(scene, other, 2)
-    with pytest.raises(InvalidInput, match="fiber"):
-        alive(scene).set_state(other.get_state())
+def test_a_state_brings_its_fibres_into_an_instance_with_others(
+    scene: _Scene, mesh, directions, alive, started
+) -> None:
+    names = [item.name for item in scene.kind.inputs() if item.fixed]
+    turned = {name: -directions[name][:, [1, 2, 0]] for name in names}
+    saver, other = started(scene.kind, mesh, scene.parameters, **turned), alive(scene)
+    for unit in (saver, other):
+        _move(scene, unit, 2)
+    other.set_state(saver.get_state())
+    for unit in (saver, other):
+        _move(scene, unit, 2, first=2)
+    assert _bits(other) == _bits(saver)
+
+
+@each_unit_with_inputs
+def test_a_state_that_nothing_can_be_prepared_from_leaves_everything_as_it_was(
+    scene: _Scene, alive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saver, unit, undisturbed = alive(scene, **{scene.other[0]: scene.other[1]}), alive(scene), alive(scene)
+    saved = saver.get_state()
+    for each in (unit, undisturbed):
+        _move(scene, each, 2)
+    before, prepare = _bits(unit), unit.prepare
+
+    def failing() -> None:
+        # Half of it is there already.
+        prepare()
+        if unit.get(scene.other[0]) == scene.other[1]:
+            raise StepFailure("no memory is left")
+
+    monkeypatch.setattr(unit, "prepare", failing)
+    with pytest.raises(StepFailure, match="no memory is left"):
+        unit.set_state(saved)
+    assert unit.phase is Phase.STEPPING
+    assert unit.get(scene.other[0]) != scene.other[1]
+    assert _bits(unit) == before
+    for each in (unit, undisturbed):
+        _move(scene, each, 2, first=2)
+    assert _bits(unit) == _bits(undisturbed)
+
+
+@each_unit
+def test_a_state_that_nothing_can_be_prepared_from_leaves_what_is_foreseen(
+    scene: _Scene, alive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved, unit = alive(scene, **{scene.other[0]: scene.other[1]}).get_state(), scene.kind(alive(scene).mesh)
+    unit.instantiate(scene.parameters)
+    unit.enter_initialization_mode()
+    before, prepare = _outputs(unit), unit.prepare
+
+    def failing() -> None:
+        prepare()
+        if unit.get(scene.other[0]) == scene.other[1]:
+            raise StepFailure("no memory is left")
+
+    monkeypatch.setattr(unit, "prepare", failing)
+    with pytest.raises(StepFailure):
+        unit.set_state(saved)
+    assert unit.phase is Phase.INITIALIZATION
+    assert _outputs(unit) == before
+
+
+@each_unit
+def test_a_state_that_does_not_fit_is_refused(scene: _Scene, alive) -> None:
+    unit = alive(scene)
+    _move(scene, unit, 2)
+    before, saved = _bits(unit), unit.get_state()
+
+    def shorter(arrays: Any) -> dict[str, np.ndarray]:
+        return {name: value[:-1] if value.ndim else np.zeros(2) for name, value in arrays.items()}
+
+    wrong = {
+        f"'another' was given to unit '{scene.kind.name}'": [replace(saved, unit="another")],
+        "belongs to another mesh": [replace(saved, mesh="another")],
+        "state arrays of the state do not fit": [
+            replace(saved, state=shorter(saved.state)),
+            replace(saved, state={}),
+            replace(saved, state=dict(list(saved.state.items())[1:]) | {"another": np.zeros(3)}),
+            replace(saved, phase=Phase.INITIALIZATION),
+        ],
+        "input arrays of the state do not fit": [
+            replace(saved, inputs=dict(saved.inputs) | {"another": np.zeros(3)}),
+            replace(saved, phase=Phase.INSTANTIATED, inputs={scene.kind.outputs()[0].name: np.zeros(3)}),
+        ],
+        "parameter '.*' is 'no such'|parameter '.*' is nan": [
+            replace(saved, parameters={scene.other[0]: "no such" if isinstance(scene.other[1], str) else np.nan})
+        ],
+        "has no variable 'no_such'": [replace(saved, parameters={"no_such": 1.0})],
+    }
+    if saved.inputs:
+        wrong["input arrays of the state do not fit"] += [
+            replace(saved, inputs={}),
+            replace(saved, inputs=shorter(saved.inputs)),
+        ]
+    if saved.taken is not None:
+        wrong["arrays of the last step in the state do not fit"] = [
+            replace(saved, taken=replace(saved.taken, before=shorter(saved.taken.before))),
+            replace(saved, taken=replace(saved.taken, begin={})),
+            replace(saved, taken=replace(saved.taken, inputs=shorter(saved.taken.inputs))),
+        ]
+    for said, snapshots in wrong.items():
+        for snapshot in snapshots:
+            with pytest.raises(InvalidInput, match=said):
+                unit.set_state(snapshot)
+            assert _bits(unit) == before
 
 
 def test_state_of_another_mesh_with_as_many_nodes_and_elements_is_refused(mesh, alive, directions, started) -> None:
@@ -636,11 +795,30 @@ def test_state_of_another_mesh_with_as_many_nodes_and_elements_is_refused(mesh, 
 
 
 @each_unit
+def test_a_state_and_its_bytes_are_the_same(scene: _Scene, alive) -> None:
+    unit = alive(scene)
+    for phase in _phases(scene, unit):
+        again = Snapshot.from_bytes(phase.to_bytes())
+        assert (again.unit, again.mesh, again.phase) == (phase.unit, phase.mesh, phase.phase)
+        assert again.parameters == phase.parameters
+        assert [type(value) for value in again.parameters.values()] == [type(v) for v in phase.parameters.values()]
+        assert again.to_bytes() == phase.to_bytes()
+        for arrays, own in ((again.inputs, phase.inputs), (again.state, phase.state)):
+            assert {name: value.tobytes() for name, value in arrays.items()} == {n: v.tobytes() for n, v in own.items()}
+            assert not any(value.flags.writeable for value in arrays.values())
+
+
+@each_unit
 def test_bytes_that_are_no_state_are_refused(scene: _Scene, alive) -> None:
     data = alive(scene).get_state().to_bytes()
     for wrong in (b"", b"no state", data[: len(data) // 2], data[100:]):
         with pytest.raises(InvalidInput, match="no serialized state"):
             scene.kind.deserialize(wrong)
+    # One byte of an array: the archive's own checksum tells.
+    wrong = bytearray(data)
+    wrong[data.index(b"NUMPY", data.index(b"state/")) + 130] ^= 1
+    with pytest.raises(InvalidInput, match="no serialized state"):
+        scene.kind.deserialize(bytes(wrong))
 
 
 # --- parameters reach the physics ----------------------------------------------------------------------------------

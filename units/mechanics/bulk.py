@@ -110,6 +110,15 @@ class NumpyBulk:
         squared = np.einsum("pij,pij->p", gradient.transpose(0, 2, 1) @ gradient, self._structure)
         return np.asarray(np.sqrt(squared).reshape(len(self._nodes), -1).mean(axis=1))
 
+    def active_forces(self, displacement: FloatArray) -> FloatArray:
+        """Derivative of the forces in N by the active stress in MPa at an element's four vertices.
+
+        Shape (elements, element nodes, 3, 4).
+        """
+        pulled = self._gradients @ self._active @ self.gradient(displacement).transpose(0, 2, 1)
+        pulled *= self._weights[:, None, None]
+        return np.einsum("epai,pv->eaiv", pulled.reshape(len(self._nodes), -1, *pulled.shape[1:]), self._shares)
+
     def _kinematics(self, gradient: FloatArray, ratio: FloatArray) -> Kinematics:
         return Kinematics.of(gradient, ratio, self._structure, self._sheet_structure)
 

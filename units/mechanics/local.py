@@ -16,13 +16,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray, frozen
+from ..differentiable import Differentiable
 from ..errors import StepFailure
 from ..snapshot import State
-from ..unit import Unit
-from ..variable import parameter
+from ..taken import Taken
+from ..variable import Causality, Location, parameter
 from .laws.registry import LAWS, Material
 from .loads.active_stiffness import Stabilization, StretchDependence
 from .loads.active_stress import ActiveShares
+from .loads.tension_change import TensionChange
+from .local_derivative import LocalDerivative
 from .local_equilibrium import LocalEquilibrium
 from .local_tension import LocalTension
 from .unit import Mechanics
@@ -35,6 +38,10 @@ _MOST_LOAD_STEPS = 64
 #: What the outputs follow; the others are zero. An element's stretch follows only what is around it; but to write all
 #: of that into an FMU would take a hundred times what else is in it, and it may say that an output follows everything.
 _FOLLOWS = {"stretch": Mechanics.variable("stretch").depends_on}
+
+#: Outputs that are always zero, and inputs that nothing follows, since there is no cavity.
+_STILL = {item.name for item in Mechanics.fields if item.causality is Causality.OUTPUT} - _FOLLOWS.keys()
+_PRESSURES = [item.name for item in Mechanics.inputs() if item.location is Location.GLOBAL]
 
 
 @dataclass(frozen=True)
@@ -49,7 +56,7 @@ class Hold:
     )
 
 
-class LocalMechanics(Unit):
+class LocalMechanics(Differentiable):
     """Pointwise equilibrium of the wall, with the variables of finite-element mechanics."""
 
     name = "local_mechanics"
@@ -71,13 +78,7 @@ class LocalMechanics(Unit):
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """The undeformed state, brought to equilibrium with the initial active stress."""
-        elements = self.mesh.elements
-        undeformed = {
-            "squares": np.ones((elements, 3)),
-            "tension": np.zeros(elements),
-            "reference": np.ones(elements),
-        }
-        return self.advance(undeformed, inputs, inputs, 0.0, 0.0)
+        return self.advance(self._undeformed(), inputs, inputs, 0.0, 0.0)
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
         """Equilibrium under the active stress at the end of the step, found from the last one."""
@@ -100,6 +101,27 @@ class LocalMechanics(Unit):
             f"{np.abs(change).max():.3g} MPa: take shorter communication steps"
         )
 
+    def derivative(self, taken: Taken, state: State) -> LocalDerivative:
+        """See Differentiable."""
+        before, inputs = taken.before or self._undeformed(), taken.inputs
+        dependence = self._dependence(before, inputs, taken.step)
+        around, squares = self._tension.around, state["squares"]
+        tension = TensionChange(
+            average=around,
+            # Also where there is no stiffness yet.
+            beyond=around @ (np.sqrt(squares[:, 0]) - self._reference(before, inputs, taken.step)),
+            stiffness=dependence.stiffness,
+            given=inputs["reference_stretch"] != 0.0,
+            share=self._stabilization,
+        )
+        return LocalDerivative(
+            tension,
+            self._tension.tangent(squares, dependence),
+            self._equilibrium.stretch_by_tension(squares),
+            {item.name: item.shape(self.mesh) for item in self.fields if item.name in _STILL},
+            _PRESSURES,
+        )
+
     def output(self, name: str, state: State) -> FloatArray:
         """Stretch (elements,); nothing is displaced, and there is no cavity."""
         if name == "stretch":
@@ -116,9 +138,19 @@ class LocalMechanics(Unit):
 
     def _dependence(self, state: State, inputs: State, step: float) -> StretchDependence:
         stiffness = self._stabilization * _MPA_PER_KPA * inputs["active_stiffness"]
-        reference = state["reference"]
-        if stiffness.any():
-            # A step of no length begins where the last one began.
-            own = np.sqrt(state["squares"][:, 0]) if step else reference
-            reference = np.where(inputs["reference_stretch"], inputs["reference_stretch"], own)
+        reference = self._reference(state, inputs, step) if stiffness.any() else state["reference"]
         return StretchDependence(stiffness, reference)
+
+    def _reference(self, state: State, inputs: State, step: float) -> FloatArray:
+        """The stretch that the active stiffness holds at, where there is one."""
+        # A step of no length begins where the last one began.
+        own = np.sqrt(state["squares"][:, 0]) if step else state["reference"]
+        return np.where(inputs["reference_stretch"], inputs["reference_stretch"], own)
+
+    def _undeformed(self) -> dict[str, FloatArray]:
+        elements = self.mesh.elements
+        return {
+            "squares": np.ones((elements, 3)),
+            "tension": np.zeros(elements),
+            "reference": np.ones(elements),
+        }

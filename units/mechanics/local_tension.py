@@ -7,9 +7,11 @@ A averages stretches around the nodes, M active stresses over an element's nodes
 (`loads/active_stiffness`).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.sparse import coo_matrix, diags_array, identity
-from scipy.sparse.linalg import splu
+from scipy.sparse import coo_matrix, csr_matrix, diags_array, identity
+from scipy.sparse.linalg import SuperLU, splu
 
 from ..arrays import FloatArray
 from ..mesh import Mesh
@@ -28,11 +30,20 @@ class LocalTension:
 
     def __init__(self, equilibrium: LocalEquilibrium, mesh: Mesh) -> None:
         self._equilibrium, self._cells = equilibrium, mesh.cells
-        self._around = around_nodes(mesh.cells, mesh.volumes)
+        #: What averages around the nodes, shape (nodes, elements).
+        self.around = around_nodes(mesh.cells, mesh.volumes)
         corners = mesh.cells.shape[1]
         elements = np.repeat(np.arange(mesh.elements), corners)
         shares = np.full(elements.shape, 1.0 / corners)
         self._mean = coo_matrix((shares, (elements, mesh.cells.ravel())), (mesh.elements, mesh.nodes)).tocsr()
+
+    def tangent(self, squares: FloatArray, dependence: StretchDependence) -> "TensionTangent":
+        """How tensions answer small changes of the active stress at the equilibria `squares`, shape (elements, 3)."""
+        if not dependence.stiffness.any():
+            return TensionTangent(self._mean, None)
+        slope = diags_array(self._equilibrium.stretch_by_tension(squares))
+        back = self._mean @ diags_array(dependence.stiffness) @ self.around @ slope
+        return TensionTangent(self._mean, splu((identity(len(squares)) - back).tocsc()))
 
     def in_elements(self, values: FloatArray) -> FloatArray:
         """The mean over each element's nodes, shape (nodes,) to (elements,)."""
@@ -50,7 +61,7 @@ class LocalTension:
         if not dependence.stiffness.any():
             squares = self._equilibrium.squares(start, asked)
             return None if squares is None else (squares, asked)
-        back = share * (self._mean @ diags_array(dependence.stiffness) @ self._around)
+        back = share * (self._mean @ diags_array(dependence.stiffness) @ self.around)
         tension, squares = before, start
         for _ in range(_ITERATIONS):
             found = self._equilibrium.squares(squares, tension)
@@ -63,3 +74,25 @@ class LocalTension:
             slope = diags_array(self._equilibrium.stretch_by_tension(squares))
             tension = tension - splu((identity(len(tension)) - back @ slope).tocsc()).solve(residual)
         return None
+
+
+@dataclass(frozen=True)
+class TensionTangent:
+    """The linear map from changes of the active stress at the nodes to changes of tensions, and its transpose.
+
+    `mean` averages over an element's nodes, shape (elements, nodes); `factors` are those of what the tensions' own
+    stretches leave of a change, or None where they do not count.
+    """
+
+    mean: csr_matrix
+    factors: SuperLU | None
+
+    def along(self, stress: FloatArray) -> FloatArray:
+        """δs in MPa, shape (elements,), for a change in MPa at the nodes, shape (nodes,)."""
+        asked = self.mean @ stress
+        return asked if self.factors is None else np.asarray(self.factors.solve(asked))
+
+    def back(self, gradient: FloatArray) -> FloatArray:
+        """The gradient by the active stress, shape (nodes,), for one by the tensions, shape (elements,)."""
+        answer = gradient if self.factors is None else self.factors.solve(gradient, "T")
+        return np.asarray(self.mean.T @ answer)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
 
 from ..arrays import FloatArray, IntArray
 from .bulk import NumpyBulk, Tissue
@@ -72,17 +73,38 @@ class Solid:
 
     def is_symmetric(self, loads: FloatArray) -> bool:
         """Whether the tangent is the residual's whole derivative, and the energy its potential: no active stiffness."""
-        return self._dependence(loads) is None
+        return self.dependence(loads) is None
 
-    def active_forces(self, displacement: FloatArray, tension: FloatArray) -> FloatArray:
-        """Forces in N of an active stress `tension` in MPa, shape (vertices,), at the free degrees of freedom.
+    def held(self, displacement: FloatArray, loads: FloatArray) -> FloatArray:
+        """Loads with the active stress that there is, held while the solid deforms further; shape (loads,)."""
+        tension = self._tension(displacement, loads)
+        return np.concatenate([tension, loads[self._vertices : self.loads]])
 
-        ValueError where an element is inverted.
-        """
-        found = [self._bulk.forces(displacement, stress, False) for stress in (tension, 0.0 * tension)]
-        if found[0] is None or found[1] is None:
-            raise ValueError("an element is inverted")
-        return (found[0][1] - found[1][1]).reshape(-1)[self._places]
+    def active_forces(self, displacement: FloatArray) -> csr_matrix:
+        """Derivative of the residual by the active stress at the vertices, in N/MPa, shape (unknowns, vertices)."""
+        blocks = self._numpy.active_forces(displacement)
+        degrees = 3 * self.space.nodes[:, :, None, None] + np.arange(3)[:, None]
+        rows, columns = np.broadcast_arrays(degrees, self.space.nodes[:, None, None, :4])
+        shape = (self.free.size, self._vertices)
+        return coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape).tocsr()[self._places]
+
+    def pressure_forces(self, displacement: FloatArray) -> FloatArray:
+        """Derivative of the residual by the sizes of the surface loads, in N/MPa, shape (pressures, unknowns)."""
+        forces = [load.forces(displacement).reshape(-1)[self._places] for load in self._pressures]
+        return np.reshape(forces, (len(forces), self.unknowns))
+
+    def stretch_gradient(self, displacement: FloatArray) -> csr_matrix:
+        """Derivative of the stretch by the free degrees of freedom, in 1/mm, shape (elements, unknowns)."""
+        blocks = self.active_stiffness.stretch_gradient(displacement)
+        degrees = 3 * self.space.nodes[:, :, None] + np.arange(3)
+        elements = np.broadcast_to(np.arange(len(blocks))[:, None, None], blocks.shape)
+        shape = (len(blocks), self.free.size)
+        return coo_matrix((blocks.ravel(), (elements.ravel(), degrees.ravel())), shape).tocsr()[:, self._places]
+
+    def selection(self) -> csr_matrix:
+        """From the free degrees of freedom to all, those of a node together, shape (3 nodes, unknowns)."""
+        ones = np.ones(self.unknowns)
+        return csr_matrix((ones, (self._places, np.arange(self.unknowns))), (self.free.size, self.unknowns))
 
     def moved(self, displacement: FloatArray, step: FloatArray) -> FloatArray:
         """A new displacement, shape (nodes, 3): the free degrees of freedom moved by `step`, shape (unknowns,)."""
@@ -132,7 +154,7 @@ class Solid:
         Of the active stiffness the part that is symmetric (`loads/active_stiffness`).
         """
         blocks = self._bulk.stiffness(displacement, self._tension(displacement, loads))
-        dependence = self._dependence(loads)
+        dependence = self.dependence(loads)
         if dependence is not None:
             self._pattern.add(blocks, self._pattern.slots, self.active_stiffness.stiffness(displacement, dependence))
         for size, load in self._on_surfaces(loads):
@@ -151,12 +173,12 @@ class Solid:
 
     def _tension(self, displacement: FloatArray, loads: FloatArray) -> FloatArray:
         """The active stress at the vertices, with what it gains by the stretch, shape (vertices,)."""
-        tension, dependence = loads[: self._vertices], self._dependence(loads)
+        tension, dependence = loads[: self._vertices], self.dependence(loads)
         if dependence is None:
             return tension
         return tension + self.active_stiffness.stress(self.stretch(displacement), dependence)
 
-    def _dependence(self, loads: FloatArray) -> StretchDependence | None:
+    def dependence(self, loads: FloatArray) -> StretchDependence | None:
         """How the active stress depends on the stretch; None where it does not."""
         stiffness = loads[self.loads : self.loads + self._vertices]
         return StretchDependence(stiffness, loads[self.loads + self._vertices :]) if stiffness.any() else None

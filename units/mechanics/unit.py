@@ -14,21 +14,24 @@ with StepFailure. With the energy as the seed prints it (`neo_hooke_log_sign: se
 stress-free, so that there is no state to start from: the initialisation ends with StepFailure.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from .. import kernels
 from ..arrays import FloatArray, IntArray, frozen
+from ..differentiable import Differentiable
 from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions
 from ..errors import InvalidInput, StepFailure
 from ..mesh import Mesh
 from ..mesh.cavity import cavity_faces
 from ..mesh.wall import wall_of
 from ..snapshot import State
-from ..unit import Unit
+from ..taken import Taken
 from ..variable import Causality, Location, Record, Variable
 from .bulk import Tissue
+from .derivative import MechanicsDerivative
 from .elements.registry import Elements
 from .laws.neo_hooke import NeoHooke
 from .laws.registry import LAWS, Material
@@ -36,12 +39,13 @@ from .loads.active_stiffness import Stabilization
 from .loads.active_stress import ActiveShares
 from .loads.cavity_pressure import CavityPressure
 from .loads.registry import SUPPORTS
+from .loads.tension_change import TensionChange
 from .solid import Solid
 from .solvers.choice import LinearSolver
 from .solvers.equilibrium import Convergence, Equilibrium
 from .solvers.factored import Factored
 from .solvers.predictor import MEMORY, Predictor
-from .stretch_response import StretchResponse
+from .tangent import Tangent
 
 _MPA_PER_KPA = 1e-3
 _ML_PER_MM3 = 1e-3
@@ -62,7 +66,7 @@ _FOLLOWS_ALL = (
 )
 
 
-class Mechanics(Unit):
+class Mechanics(Differentiable):
     """Finite-element mechanics of the wall."""
 
     name = "mechanics"
@@ -176,6 +180,9 @@ class Mechanics(Unit):
                     else ""
                 )
             )
+        return self.advance(self._undeformed(), inputs, inputs, 0.0, 0.0)
+
+    def _undeformed(self) -> dict[str, FloatArray]:
         rest = frozen(np.zeros((len(self._solid.space.points), 3)))
         stresses = frozen(np.zeros(self._solid.loads))
         unloaded = frozen(np.concatenate([stresses, np.zeros(self.mesh.nodes), np.ones(self.mesh.elements)]))
@@ -188,7 +195,7 @@ class Mechanics(Unit):
         }
         for load, displacement in _CHANGES:
             undeformed |= {load: stresses, displacement: rest}
-        return self.advance(undeformed, inputs, inputs, 0.0, 0.0)
+        return undeformed
 
     def advance(self, state: State, begin: State, inputs: State, time: float, step: float) -> dict[str, FloatArray]:
         """Equilibrium under the loads at the end of the step; a memoryless map but for its starting guess."""
@@ -232,22 +239,60 @@ class Mechanics(Unit):
             return frozen(0.0)
         return frozen(_ML_PER_MM3 * self._cavities[name].volume(displacement))
 
-    def stretch_response(self) -> StretchResponse:
-        """How the stretch answers a small change of the active stress at present, its own stiffness left out."""
-        state = self.get_state().state
-        return StretchResponse(self._solid, state["displacement"], state["loads"][: self._solid.loads])
+    def derivative(self, taken: Taken, state: State) -> MechanicsDerivative:
+        """See Differentiable."""
+        solid, displacement = self._solid, state["displacement"]
+        reference = self._reference(taken.before or self._undeformed(), taken.inputs, taken.step)
+        average, dependence = solid.active_stiffness.average, solid.dependence(state["loads"])
+        tension = TensionChange(
+            average=average,
+            # Also where there is no stiffness yet.
+            beyond=average @ (solid.stretch(displacement) - reference),
+            stiffness=np.zeros(self.mesh.nodes) if dependence is None else dependence.stiffness,
+            given=taken.inputs["reference_stretch"] != 0.0,
+            share=self._stabilization,
+        )
+        tangent = Tangent(solid, displacement, state["loads"])
+        at_nodes, forces = solid.selection(), solid.pressure_forces(displacement)
+        matrices = {
+            "stretch": tangent.stretch,
+            "displacement": at_nodes[: 3 * self.mesh.nodes],
+            "apex_uplift": at_nodes[3 * self._apex + 2],
+        }
+        # A pressure of 1 MPa has the potential −V.
+        matrices |= {name: csr_matrix(-_ML_PER_MM3 * force) for name, force in zip(self._cavities, forces, strict=True)}
+        absent = _PRESSURES.keys() - self._cavities.keys()
+        matrices |= {name: csr_matrix((1, solid.unknowns)) for name in absent}
+        return MechanicsDerivative(
+            tension,
+            tangent,
+            [_PRESSURES[name] for name in self._cavities],
+            [_PRESSURES[name] for name in absent],
+            {name: (matrix, self.variable(name).shape(self.mesh)) for name, matrix in matrices.items()},
+        )
+
+    def stretch_response(self) -> Callable[[FloatArray], FloatArray]:
+        """How the stretch answers a small change of the active stress at present, its own stiffness left out.
+
+        From changes of the active stress at the nodes in MPa, shape (nodes,), to changes of the stretch, (elements,).
+        """
+        state, still = self.get_state().state, np.zeros(len(self._cavities))
+        tangent = Tangent(self._solid, state["displacement"], state["loads"][: self._solid.loads])
+        return lambda change: tangent.stretch @ tangent.displacement(change, still)
 
     def _loads(self, state: State, inputs: State, step: float) -> FloatArray:
         """As `Solid` has them: stresses and active stiffness in MPa, and the stretch they hold at."""
         pressures = [np.atleast_1d(inputs[_PRESSURES[name]]) for name in self._cavities]
         stiffness = self._stabilization * inputs["active_stiffness"]
         stresses = _MPA_PER_KPA * np.concatenate([inputs["active_stress"], *pressures, stiffness])
-        reference = state["loads"][len(stresses) :]
-        if stiffness.any():
-            # A step of no length begins where the last one began.
-            own = self._solid.stretch(state["displacement"]) if step else reference
-            reference = np.where(inputs["reference_stretch"], inputs["reference_stretch"], own)
+        reference = self._reference(state, inputs, step) if stiffness.any() else state["loads"][len(stresses) :]
         return frozen(np.concatenate([stresses, reference]))
+
+    def _reference(self, state: State, inputs: State, step: float) -> FloatArray:
+        """The stretch that the active stiffness holds at, where there is one."""
+        # A step of no length begins where the last one began.
+        own = self._solid.stretch(state["displacement"]) if step else state["loads"][-self.mesh.elements :]
+        return np.where(inputs["reference_stretch"], inputs["reference_stretch"], own)
 
 
 #: The last changes of loads and of displacement in the state, the latest first.

@@ -20,9 +20,11 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..arrays import FloatArray
+from ..differentiable import Differentiable
 from ..snapshot import State
-from ..unit import Unit
+from ..taken import Taken
 from ..variable import Causality, Record, Variable, parameter
+from .scalar_derivative import ScalarDerivative
 
 _MS_PER_S = 1000.0
 
@@ -58,7 +60,7 @@ class Release:
     v_start: float = parameter(0.0, "1", "velocity at the start")
 
 
-class Mass(Unit):
+class Mass(Differentiable):
     """A damped mass on a spring, coupled to another through a spring and a damper."""
 
     name = "mass"
@@ -107,6 +109,16 @@ class Mass(Unit):
             loads = np.stack([first, (last - first) / step_s])
             motion = self._suspension.propagator(step_s)[:, :4] @ np.concatenate([motion, loads])
         return self._state_of(motion, inputs)
+
+    def derivative(self, taken: Taken, state: State) -> ScalarDerivative:
+        """See Differentiable. Both ends of an input move, so that the load moves and its slope stays."""
+        by_load = self._suspension.propagator(taken.step / _MS_PER_S)[:, 2] if taken.step > 0.0 else np.zeros(2)
+        inputs = np.eye(3)
+        x, v = by_load[:, None] * self._suspension.load(*inputs)
+        force = self._suspension.reaction(x, v, inputs[1], inputs[2])
+        names = [variable.name for variable in self.inputs()]
+        rows = {"x": x, "v": v, "F": force}
+        return ScalarDerivative({name: dict(zip(names, row.tolist(), strict=True)) for name, row in rows.items()})
 
     def output(self, name: str, state: State) -> FloatArray:
         """A scalar."""

@@ -19,9 +19,11 @@ import numpy as np
 from scipy.special import exprel
 
 from ..arrays import FloatArray
+from ..differentiable import Differentiable
 from ..snapshot import State
-from ..unit import Unit
+from ..taken import Taken
 from ..variable import Causality, Record, Variable, parameter
+from .scalar_derivative import ScalarDerivative
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Law:
         return np.asarray(w - (first - w) * np.expm1(-decay) + (last - first) * (1.0 - exprel(-decay)))
 
 
-class Response(Unit):
+class Response(Differentiable):
     """A number that follows another: at once, with a delay, or its rate."""
 
     name = "response"
@@ -77,6 +79,16 @@ class Response(Unit):
         # A held input has jumped to where it is since the last step; a ramped one comes from where its ramp begins.
         first = state["last"] if begin is inputs else begin["u"]
         return {"delayed": delayed, "rate_per_ms": np.asarray((last - first) / step), "last": last.copy()}
+
+    def derivative(self, taken: Taken, state: State) -> ScalarDerivative:
+        """See Differentiable. A held input moves away from what it was in the last step; a ramp keeps its rate."""
+        law = self._law
+        slope = law.gain
+        if taken.before and law.delay_rate_per_ms:
+            slope *= -float(np.expm1(-law.delay_rate_per_ms * taken.step))
+        if taken.step > 0.0 and taken.held:
+            slope += law.rate_gain_ms / taken.step
+        return ScalarDerivative({"y": {"u": slope}})
 
     def output(self, name: str, state: State) -> FloatArray:
         """A scalar."""

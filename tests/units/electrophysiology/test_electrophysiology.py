@@ -1,6 +1,7 @@
 """If these fail, the heart's electrical wave starts, spreads, couples to stretch or is timed wrongly."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,6 @@ from cardiac_cosim.units.electrophysiology.time_scale import TimeScale
 from cardiac_cosim.units.electrophysiology.unit import Electrophysiology
 from cardiac_cosim.units.errors import InvalidInput, StepFailure
 from cardiac_cosim.units.mesh import Mesh
-from cardiac_cosim.units.snapshot import Snapshot
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
@@ -102,7 +102,7 @@ def test_stimulus_without_nodes_is_refused(cube, started, along) -> None:
 
 def test_fibres_that_are_no_unit_vectors_are_refused(cube, started, along) -> None:
     with pytest.raises(InvalidInput, match="'fiber' is no unit vector in element 0"):
-        started(Electrophysiology, cube)
+        started(Electrophysiology, cube, fiber=np.zeros((cube.elements, 3)))
     fiber = along(cube, (1, 0, 0))
     fiber[3] *= 1.0 + 1e-5
     with pytest.raises(InvalidInput, match="no unit vector in element 3"):
@@ -567,7 +567,7 @@ def test_activation_time_keeps_the_first_crossing(cube, started, along) -> None:
     # The same tissue again below threshold and without recovery, later in time: it crosses a second time.
     saved = unit.get_state()
     again = dict(saved.state) | {"phi": np.full(cube.nodes, 0.2), "recovery": np.zeros(cube.nodes)}
-    unit.set_state(Snapshot(saved.unit, saved.mesh, saved.inputs, again))
+    unit.set_state(replace(saved, state=again))
     assert unit.get("potential").max() < -20.0
     unit.do_step(0.05, 0.05)
     assert unit.get("potential").min() > -20.0
@@ -583,7 +583,7 @@ def test_downward_crossing_is_no_activation(cube, started, along) -> None:
     )
     saved = unit.get_state()
     falling = dict(saved.state) | {"phi": np.full(cube.nodes, 0.65), "recovery": np.full(cube.nodes, 3.0)}
-    unit.set_state(Snapshot(saved.unit, saved.mesh, saved.inputs, falling))
+    unit.set_state(replace(saved, state=falling))
     unit.do_step(0.0, 0.05)
     assert unit.get("potential").max() < -20.0
     assert (unit.get("activation_time") == NOT_ACTIVATED).all()

@@ -29,23 +29,19 @@ def _exact(inputs: Any, end: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("step", [1e-3, 0.3, 4.0])
-@pytest.mark.parametrize("interpolation", ["hold", "linear"])
+@pytest.mark.parametrize("ramped", [False, True])
 def test_a_step_is_exact_for_inputs_that_are_held_or_run_along_a_line(
-    step: float, interpolation: str, point: Mesh, started: Any
+    step: float, ramped: bool, point: Mesh, started: Any
 ) -> None:
     first, last = np.array([1.0, -0.5, 2.0]), np.array([-2.0, 0.7, 0.1])
     names = ("F_in", "x_in", "v_in")
-    unit = started(
-        Mass, point, {**_PARAMETERS, "input_interpolation": interpolation}, **dict(zip(names, first, strict=True))
-    )
-    for name, value in zip(names, last, strict=True):
-        unit.set(name, value)
-    unit.do_step(0.0, step)
-    ramps = interpolation == "linear"
-    x, v = _exact(lambda time: first + time / step * (last - first) if ramps else last, step)
+    unit = started(Mass, point, _PARAMETERS, **dict(zip(names, first, strict=True)))
+    unit.do_step(0.0, step, dict(zip(names, last, strict=True)) if ramped else None)
+    x, v = _exact(lambda time: first + time / step * (last - first) if ramped else first, step)
+    _, place, speed = last if ramped else first
     assert unit.get("x") == pytest.approx(x, rel=1e-9, abs=1e-10)
     assert unit.get("v") == pytest.approx(v, rel=1e-9, abs=1e-10)
-    assert unit.get("F") == pytest.approx(5.0 * (x - 0.7) + 0.8 * (v - 0.1), rel=1e-9)
+    assert unit.get("F") == pytest.approx(5.0 * (x - place) + 0.8 * (v - speed), rel=1e-9)
 
 
 def test_ramped_inputs_are_of_second_order_and_held_ones_of_first(point: Mesh, started: Any, slopes: Any) -> None:
@@ -53,16 +49,18 @@ def test_ramped_inputs_are_of_second_order_and_held_ones_of_first(point: Mesh, s
         return np.array([np.sin(3.0 * time), np.cos(2.0 * time), -np.sin(time)])
 
     exact, counts = _exact(inputs, 2.0), (80, 160, 320)
-    for interpolation, order in (("hold", 1.0), ("linear", 2.0)):
+    for ramped, order in ((False, 1.0), (True, 2.0)):
         errors = []
         for count in counts:
             names = ("F_in", "x_in", "v_in")
-            given = dict(zip(names, inputs(0.0), strict=True))
-            unit = started(Mass, point, {**_PARAMETERS, "input_interpolation": interpolation}, **given)
+            unit = started(Mass, point, _PARAMETERS)
             for number in range(count):
-                for name, value in zip(names, inputs(2.0 * (number + 1) / count), strict=True):
+                begin, end = (
+                    dict(zip(names, inputs(2.0 * moment / count), strict=True)) for moment in (number, number + 1)
+                )
+                for name, value in begin.items():
                     unit.set(name, value)
-                unit.do_step(2.0 * number / count, 2.0 / count)
+                unit.do_step(2.0 * number / count, 2.0 / count, end if ramped else None)
             errors.append(abs(float(unit.get("x")) - exact[0]))
         np.testing.assert_allclose(slopes([2.0 / count for count in counts], errors), order, atol=0.1)
 

@@ -63,14 +63,15 @@ class ActiveStiffness:
     def __init__(self, space: Space, fiber: FloatArray) -> None:
         self._nodes, self._weights, self._shares = space.nodes, space.weights, space.vertex_shares
         volumes = space.weights.sum(axis=1)
-        self._average: csr_matrix = around_nodes(space.nodes[:, :4], volumes)
+        #: What averages around the nodes, shape (vertices, elements).
+        self.average: csr_matrix = around_nodes(space.nodes[:, :4], volumes)
         self._fiber = fiber[:, None, :]
         #: a₀·∇N, shape (elements, points, element nodes).
         self._along = np.einsum("epai,ei->epa", space.gradients, fiber)
 
     def stress(self, stretch: FloatArray, of: StretchDependence) -> FloatArray:
         """w K_a (λ − λ_ref) in MPa at the vertices, shape (vertices,); `stretch` has shape (elements,)."""
-        return np.asarray(of.stiffness * (self._average @ (stretch - of.reference)))
+        return np.asarray(of.stiffness * (self.average @ (stretch - of.reference)))
 
     def stiffness(self, displacement: FloatArray, of: StretchDependence) -> FloatArray:
         """The fibres' answer w K_a/λ in N/mm, where it is positive, shape (elements, n, 3, n, 3) of n element nodes."""
@@ -81,11 +82,11 @@ class ActiveStiffness:
         moved = np.einsum("epa,epi->eai", self._along, fiber) / self._weights.shape[1]
         return np.asarray(np.einsum("e,eai,ebj->eaibj", answer, moved, moved, optimize=True))
 
-    def stretch_change(self, displacement: FloatArray, change: FloatArray) -> FloatArray:
-        """δλ for a `change` of the displacement in mm, shape (elements,)."""
+    def stretch_gradient(self, displacement: FloatArray) -> FloatArray:
+        """∂λ by the displacement of an element's nodes in 1/mm, shape (elements, element nodes, 3)."""
         fiber = self._deformed(displacement)
-        along = np.einsum("epi,epi->ep", fiber, self._along @ change[self._nodes])
-        return np.asarray((along / _length(fiber)).mean(axis=1))
+        directions = fiber / _length(fiber)[:, :, None]
+        return np.einsum("epa,epi->eai", self._along, directions) / self._weights.shape[1]
 
     def _deformed(self, displacement: FloatArray) -> FloatArray:
         """F a₀ at the points, shape (elements, points, 3)."""
