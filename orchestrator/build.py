@@ -7,15 +7,15 @@ from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
 
-from ..fmus.container import write_container
-from ..fmus.osp import write_osp
-from ..fmus.ssp import write_ssp
-from ..fmus.system import System
 from .assembly import checked_mesh
 from .errors import InputError
 from .participants.native import Mesh, fmu_of_unit, packed_mesh
 from .scenario import Scenario
-from .system import MESH, beyond_the_standard, system_of
+from .ssp.export import write_ssp
+from .systems.container import write_container
+from .systems.of_scenario import MESH, beyond_the_standard, system_of
+from .systems.osp import write_osp
+from .systems.system import System
 from .writing import allowed, make_folder
 
 
@@ -74,9 +74,5 @@ def write_container_file(built: Built) -> Path:
 
 
 def _written(built: Built, write: Callable[[], Path]) -> Path:
-    try:
-        with allowed(built.folder, "--output"):
-            return write()
-    # What does not fit into a file format; the floor below has no other word for it.
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    with allowed(built.folder, "--output"):
+        return write()

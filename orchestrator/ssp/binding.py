@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ...fmus.ssp import NAMESPACES
 from ..coupling.connections import Law
 from ..errors import InputError
 from ..quoting import shortened
@@ -15,6 +14,7 @@ from .connector import WHOLE, written
 from .file import check, inside, member, named, parsed, read
 from .tree import Binding
 from .unit_conversion import Measure
+from .vocabulary import NAMESPACES
 from .wiring import linear_law
 
 _SET, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from ...fmus.ssp import NAMESPACES
 from ..errors import InputError
 from ..quoting import shortened
 from .component import SystemComponent
 from .file import named
+from .vocabulary import NAMESPACES
 
 #: The types of connectors that real numbers have, and those of whole numbers (SSP 2.0, section on the type choice).
 REAL = ("Real", "Float64", "Float32")

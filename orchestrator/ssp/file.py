@@ -11,11 +11,11 @@ from urllib.parse import unquote
 import fmpy
 from lxml import etree
 
-from ...fmus.ssp import NAMESPACES, STRUCTURE
 from ..errors import InputError
 from ..quoting import quoted, shortened
 from ..untrusted.archive import LARGEST_MEMBER, open_archive
 from ..untrusted.document import parse_document
+from .vocabulary import NAMESPACES, STRUCTURE
 
 #: Those of parameter mappings are read only.
 _NAMESPACES = NAMESPACES | {"ssm": "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"}

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ...fmus.ssp import NAMESPACES
 from ..errors import InputError
 from ..quoting import shortened
 from .component import SystemComponent
 from .file import inside, named, read, unpack
 from .unit_conversion import Measure
+from .vocabulary import NAMESPACES
 
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...fmus.ssp import NAMESPACES
 from ..coupling.connections import Law
 from ..errors import InputError, did_you_mean
 from ..quoting import shortened
@@ -17,6 +16,7 @@ from .connector import Sizes, check_connector, sizes, unit_of
 from .file import named, number
 from .tree import SystemNode
 from .unit_conversion import Measure, chained, conversion
+from .vocabulary import NAMESPACES
 
 _TRANSFORMATIONS = ("BooleanMappingTransformation", "IntegerMappingTransformation", "EnumerationMappingTransformation")
 

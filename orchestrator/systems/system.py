@@ -10,9 +10,9 @@ from typing import Any
 
 import fmpy
 
-from ..units.errors import InvalidInput
-from .archive import put_in_place
-from .layout import scalar_names
+from ...fmus.archive import put_in_place
+from ...fmus.layout import scalar_names
+from ..errors import InputError
 
 Shape = tuple[int, ...]
 
@@ -85,12 +85,10 @@ class Component:
         return unit
 
     def values(self) -> Iterator[Value]:
-        """All that is given, in the words of FMI; InvalidInput for a variable that the FMU does not have."""
+        """All that is given, in the words of FMI; InputError for a variable that the FMU does not have."""
         for name, value in self.given.items():
             if name not in self.variables:
-                raise InvalidInput(
-                    f"the FMU {self.fmu.name} of '{self.name}' has no variable '{name}'; remove its value"
-                )
+                raise InputError(f"the FMU {self.fmu.name} of '{self.name}' has no variable '{name}'; remove its value")
             variable = self.variables[name]
             shape = variable.shape or ()
             values = value if isinstance(value, list) else [value] * prod(shape)
@@ -160,28 +158,28 @@ class System:
     def pairs(self, link: Link) -> Iterator[tuple[str, str]]:
         """The variables that `link` connects, output and input: a pair for an array of FMI 3.0, else for every scalar.
 
-        InvalidInput where only one end is an array of FMI 3.0.
+        InputError where only one end is an array of FMI 3.0.
         """
         outputs = list(self.component(link.source).names(link.output, link.shape))
         inputs = list(self.component(link.target).names(link.input, link.shape))
         if len(outputs) != len(inputs) or (outputs == [link.output]) != (inputs == [link.input]):
-            raise InvalidInput(
+            raise InputError(
                 f"the connection {link} is of an array of FMI 3.0 at one end and of scalars at the other, which has no "
                 "place in a system; take FMUs of one version of FMI for both"
             )
         return zip(outputs, inputs, strict=True)
 
     def require_plain(self, tool: str) -> None:
-        """InvalidInput for what `tool` does not know: FMI 3.0, and links that transform the fields that they carry."""
+        """InputError for what `tool` does not know: FMI 3.0, and links that transform the fields that they carry."""
         for component in self.components:
             if component.fmi != 2:
-                raise InvalidInput(
+                raise InputError(
                     f"the FMU {component.fmu.name} of '{component.name}' is of FMI 3.0, which cannot be written for "
                     f"{tool}; take one of FMI 2.0"
                 )
         for link in self.links:
             if link.law is not None:
-                raise InvalidInput(
+                raise InputError(
                     f"the connection {link} transforms its values, which cannot be written for {tool}; "
                     "give the source the unit of the target"
                 )

@@ -6,14 +6,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ..fmus.system import Component, Link, System
-from .assembly import called_directly, make_participants
-from .coupling.connections import Connection, connect
-from .coupling.master import stepping_order
-from .errors import InputError
-from .participants.native import Mesh
-from .participants.participant import Participant, Ports
-from .scenario import Scenario
+from ..assembly import called_directly, make_participants
+from ..coupling.connections import Connection, connect
+from ..coupling.master import stepping_order
+from ..errors import InputError
+from ..participants.native import Mesh
+from ..participants.participant import Participant, Ports
+from ..scenario import Scenario
+from .system import Component, Link, System
 
 _MS_PER_S = 1000.0
 

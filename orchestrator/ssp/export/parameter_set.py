@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from ...units.errors import InvalidInput
-from ..system import REAL, Component, System, Value
+from ...errors import InputError
+from ...systems.system import REAL, Component, System, Value
+from ..vocabulary import SSV, dimensions, version
 from .measures import definitions, measured
-from .vocabulary import SSV, dimensions, version
 
 
 def parameter_set(system: System, component: Component) -> Any:
@@ -36,5 +36,5 @@ def _item(component: Component, name: str, number: str) -> str:
     """The name of an enumeration's item: a parameter set has names, where FMI has numbers."""
     items = {str(item.value): item.name for item in component.variables[name].declaredType.items}
     if number not in items:
-        raise InvalidInput(f"'{name}' of '{component.name}' has no item {number} (known: {', '.join(items)})")
+        raise InputError(f"'{name}' of '{component.name}' has no item {number} (known: {', '.join(items)})")
     return str(items[number])

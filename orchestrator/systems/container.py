@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from .archive import put_in_place
-from .layout import scalar_names
+from ...fmus.archive import put_in_place
+from ...fmus.layout import scalar_names
 from .system import Component, System
 
 
@@ -19,7 +19,7 @@ def write_container(system: System, folder: Path) -> Path:
 
     Raises
     ------
-    InvalidInput
+    InputError
         If a link transforms its values.
     """
     system.require_plain("fmu-manipulation-toolbox")

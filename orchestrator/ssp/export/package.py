@@ -7,11 +7,11 @@ from typing import Any
 
 from lxml import etree
 
-from ..archive import add, put_in_place
-from ..system import System
+from ....fmus.archive import add, put_in_place
+from ...systems.system import System
+from ..vocabulary import STRUCTURE
 from .parameter_set import parameter_set
 from .structure import parameter_file, structure
-from .vocabulary import STRUCTURE
 
 
 def write_ssp(
@@ -23,7 +23,7 @@ def write_ssp(
 
     Raises
     ------
-    InvalidInput
+    InputError
         If two FMUs mean different things by the same name of a unit of measure, if a link connects an array of FMI 3.0
         with scalars, or a variable that is given a value does not exist.
     """

@@ -4,8 +4,8 @@ from typing import Any
 
 from lxml.builder import ElementMaker
 
-from ..annotations import TOOL
-from ..system import System
+from ...fmus.annotations import TOOL
+from ..systems.system import System
 
 #: The file that makes an archive a package.
 STRUCTURE = "SystemStructure.ssd"

@@ -4,8 +4,8 @@ from itertools import combinations, pairwise
 from pathlib import Path
 
 import pytest
-from cardiac_cosim.fmus.ssp.diagram import Box, Diagram, Point
-from cardiac_cosim.fmus.system import Component, Link, System
+from cardiac_cosim.orchestrator.ssp.export.diagram import Box, Diagram, Point
+from cardiac_cosim.orchestrator.systems.system import Component, Link, System
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from importlib import metadata
 from typing import Any
 
-from ..annotations import TOOL
-from ..system import REAL, Component, Shape, System
+from ....fmus.annotations import TOOL
+from ...systems.system import REAL, Component, Shape, System
+from ..vocabulary import ANNOTATION, HINT, OWN, SSC, SSD, dimensions, version
 from .diagram import Box, Diagram, Point
 from .measures import definitions, measured
-from .vocabulary import ANNOTATION, HINT, OWN, SSC, SSD, dimensions, version
 
 
 def structure(system: System, annotation: str | None = None) -> Any:

@@ -1,4 +1,4 @@
-"""System Structure and Parameterization: a system as one package that other tools open.
+"""A system of FMUs as one package that other tools open (System Structure and Parameterization).
 
 A package is an archive of `SystemStructure.ssd` (who there is and who feeds whom), the FMUs, and a parameter set for
 every component that is given values. A system of FMI 2.0 FMUs makes a package of SSP 1.0, where a field is connected
@@ -8,6 +8,5 @@ and Ecos.
 """
 
 from .package import write_ssp
-from .vocabulary import ANNOTATION, NAMESPACES, STRUCTURE
 
-__all__ = ["ANNOTATION", "NAMESPACES", "STRUCTURE", "write_ssp"]
+__all__ = ["write_ssp"]

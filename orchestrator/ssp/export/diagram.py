@@ -11,7 +11,7 @@ are one connector here. Lengths are in mm, x to the right and y upwards (SSP 2.0
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..system import Link, System
+from ...systems.system import Link, System
 
 Point = tuple[float, float]
 

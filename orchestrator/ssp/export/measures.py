@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from typing import Any
 
-from ...units.errors import InvalidInput
-from ..system import Component
-from .vocabulary import SSC
+from ...errors import InputError
+from ...systems.system import Component
+from ..vocabulary import SSC
 
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
@@ -13,14 +13,14 @@ _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 def definitions(maker: Any, used: Iterable[tuple[Component, set[str | None]]]) -> list[Any]:
     """The element of all unit definitions, in the namespace of `maker`; none if there is nothing to define.
 
-    InvalidInput if two FMUs mean different things by the same name.
+    InputError if two FMUs mean different things by the same name.
     """
     bases: dict[str, dict[str, str]] = {}
     for component, names in used:
         for name in names & component.units.keys():
             base = _base(component.units[str(name)])
             if bases.setdefault(str(name), base) != base:
-                raise InvalidInput(
+                raise InputError(
                     f"the FMU {component.fmu.name} of '{component.name}' defines the unit of measure '{name}' "
                     "otherwise than another FMU; a package has one definition"
                 )
