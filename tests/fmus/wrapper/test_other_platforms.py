@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -70,20 +70,30 @@ def windows(tmp_path_factory: pytest.TempPathFactory, headers: Path) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """A Wine that runs already: what it starts for itself would hold the pipes of the host open."""
+    environment = {"WINEPREFIX": str(tmp_path_factory.mktemp("wine")), "WINEDEBUG": "-all"}
+    for command in ([_WINE, "wineboot", "-i"], ["wineserver", "-p"]):
+        silent = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        subprocess.run(command, **silent, timeout=120, env=os.environ | environment)
+    yield environment
+    subprocess.run(["wineserver", "-k"], env=os.environ | environment)
+
+
 @pytest.fixture
-def wine(windows: Path, fmi: int, tmp_path: Path) -> Callable[..., list[str]]:
+def wine(windows: Path, fmi: int, prefix: dict[str, str]) -> Callable[..., list[str]]:
     """Lets the host for Windows do what `words` say; `python` is the Python that it finds."""
 
     def run(python: str, location: str, *words: str) -> list[str]:
-        environment = {"WINEPREFIX": str(tmp_path), "WINEDEBUG": "-all", "COSIM_PYTHON": python}
         done = subprocess.run(
             [_WINE, "host.exe", "cosim_fmu.dll", str(fmi), location, "right", *words],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=300,
+            timeout=120,
             cwd=windows,
-            env=os.environ | environment,
+            env=os.environ | prefix | {"COSIM_PYTHON": python},
         )
         return done.stdout.splitlines()
 
