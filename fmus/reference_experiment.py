@@ -5,8 +5,7 @@ a parameter that it `needs`, is raised at the start and stays so: a number by on
 first places only. What stays constant is the same to a master that holds inputs and to one that interpolates them, and
 few places are few columns. The answers are the scalar outputs; of a unit that has none, the first places of its fields.
 
-On large meshes inputs are not raised and one step is taken, since an equilibrium there takes longer than all else that
-makes the FMU.
+On large meshes there is none, since an equilibrium there takes longer than all else that makes the FMU.
 """
 
 from collections.abc import Iterator, Mapping
@@ -23,8 +22,8 @@ from ..units.unit import Unit
 from ..units.variable import Causality, Variable
 from .layout import scalar_names
 
-#: Communication step, how many, and of how many for a large mesh.
-_STEP_MS, _STEPS, _STEPS_IF_LARGE = 1, 5, 1
+#: Communication step, and how many.
+_STEP_MS, _STEPS = 1, 5
 
 #: Elements of a mesh above which it is large; the shipped heart has 5592.
 _LARGE = 20_000
@@ -59,12 +58,12 @@ class ReferenceExperiment:
 def reference_experiment(kind: type[Unit], mesh: Mesh) -> ReferenceExperiment | None:
     """The reference experiment of a unit of this `kind` on `mesh`, run here.
 
-    None where the unit has no initial state with default parameters, as without a stimulus on the mesh.
+    None on a large mesh, and where the unit has no initial state with default parameters, as without a stimulus.
     """
-    large = mesh.elements > _LARGE
-    inputs = {} if large else {item.name: _raised(item, mesh) for item in _driven(kind)}
-    steps = _STEPS_IF_LARGE if large else _STEPS
-    times = tuple(number * _STEP_MS / 1000 for number in range(steps + 1))
+    if mesh.elements > _LARGE:
+        return None
+    inputs = {item.name: _raised(item, mesh) for item in _driven(kind)}
+    times = tuple(number * _STEP_MS / 1000 for number in range(_STEPS + 1))
     unit = kind(mesh)
     try:
         return ReferenceExperiment(times, inputs, _answers(unit, times, inputs))

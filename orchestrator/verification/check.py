@@ -130,7 +130,9 @@ class Check:
         """The FMU as a participant of the master; InputError without the file, which the caller knows."""
         name = self._path.stem
         try:
-            return FmuParticipant(name, self._path, self._parameters, self._start, **how)
+            return FmuParticipant(
+                name, self._path, self._parameters, self._start, start_s=self._experiment.start_s, **how
+            )
         except InputError as error:
             raise InputError(str(error).removeprefix(f"unit '{name}': {self._path}: ")) from None
 

@@ -169,11 +169,6 @@ class _Reader:
             raise InputError(f"{what}: its step is {size:g} s; a stepSize is above 0")
         if not allowed >= 0.0:
             raise InputError(f"{what}: its tolerance is {allowed:g}; a tolerance is at least 0")
-        if begin != 0.0:
-            raise InputError(
-                f"{what}: it begins at {begin:g} s, and this master begins at 0 s; correct startTime, or verify the "
-                "FMU by another tool"
-            )
         return Experiment(name, begin, end, size, allowed, **rest)
 
     def _source(self, element: Any, kind: str, type_: str, origin: str, title: str) -> str | None:

@@ -417,9 +417,9 @@ def test_what_cosim_build_makes_takes_a_units_place(tmp_path: Path) -> None:
     np.testing.assert_array_equal(heart[1:], fmus[1:])
 
 
-def test_system_descriptions_are_of_fmi_2_only(tmp_path: Path) -> None:
+def test_files_for_libcosim_and_containers_are_of_fmi_2_only(tmp_path: Path) -> None:
     (tmp_path / "heart.yaml").write_text(_HEART)
-    for option in ("--ssp", "--osp", "--container"):
+    for option in ("--osp", "--container"):
         arguments = ["build", str(tmp_path / "heart.yaml"), "--fmi", "3", option, "--output", str(tmp_path / "out")]
         result = CliRunner().invoke(cli.app, arguments)
         assert isinstance(result.exception, InputError)
