@@ -62,10 +62,18 @@ def build(
     file: ScenarioFile,
     output: Annotated[Path, typer.Option(help="Where the FMUs go.")] = Path("fmus-built"),
     assignments: Assignments = None,
-    ssp: Annotated[bool, typer.Option("--ssp", help="A system package too, <name>.ssp, of SSP 1.0.")] = False,
-    osp: Annotated[bool, typer.Option("--osp", help="The system structure for libcosim too.")] = False,
+    ssp: Annotated[
+        bool,
+        typer.Option(
+            "--ssp",
+            help="A system package too, <name>.ssp: of SSP 1.0, or with --fmi 3 of SSP 2.0, where a field is one "
+            "connection.",
+        ),
+    ] = False,
+    osp: Annotated[bool, typer.Option("--osp", help="The system structure for libcosim too (FMI 2.0).")] = False,
     container: Annotated[
-        bool, typer.Option("--container", help="The description for fmucontainer too, which makes one FMU of all.")
+        bool,
+        typer.Option("--container", help="The description for fmucontainer too, which makes one FMU of all (FMI 2.0)."),
     ] = False,
     fmi: Annotated[
         int, typer.Option("--fmi", min=2, max=3, help="FMI 2.0, or FMI 3.0, where a field is one array.")
@@ -76,8 +84,8 @@ def build(
     from ..orchestrator.scene_warnings import scene_warnings
 
     with opened(file, assignments or []) as (scenario, base), about(file):
-        if fmi == 3 and (ssp or osp or container):
-            raise InputError("--ssp, --osp and --container are for FMUs of FMI 2.0; leave --fmi 3 out")
+        if fmi == 3 and (osp or container):
+            raise InputError("--osp and --container are for FMUs of FMI 2.0; leave --fmi 3 out")
         built = build_fmus(scenario, base, output, may_be_none=ssp or osp or container, fmi=fmi)
         for text in scene_warnings(scenario, built.mesh):
             _warn(text)

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from cardiac_cosim.fmus.documents import limits, notes, shape
 from cardiac_cosim.units.registry import UNITS
 from cardiac_cosim.units.unit import FALLBACKS, IMPLEMENTATION, Unit
-from cardiac_cosim.units.variable import Causality, Location, Refinement, Variable
+from cardiac_cosim.units.variable import Causality, Refinement, Variable
 
 #: What makes the error smaller.
 _REFINED_BY = {Refinement.STEP: "dividing it", Refinement.MESH: "raising it", Refinement.TOLERANCE: "dividing it"}
@@ -56,12 +57,12 @@ def _unit(unit: type[Unit]) -> str:
     parameters = [variable for variable in unit.variables() if variable.causality is Causality.PARAMETER]
     lines += ["| variable | | unit | shape | description |", "|---|---|---|---|---|"]
     lines += [
-        f"| `{item.name}` | {item.causality.value} | {item.unit} | {_shape(item)} | {item.description}{_note(item)} |"
+        f"| `{item.name}` | {item.causality.value} | {item.unit} | {shape(item)} | {item.description}{notes(item)} |"
         for item in fields
     ]
     lines += ["", "| parameter | default | unit | range | description |", "|---|---|---|---|---|"]
     lines += [
-        f"| `{item.name}` | {item.start} | {item.unit} | {_range(item)} | {item.description}{_accuracy(item)} |"
+        f"| `{item.name}` | {item.start} | {item.unit} | {limits(item)} | {item.description}{_accuracy(item)} |"
         for item in parameters
     ]
     return "\n".join(lines) + "\n"
@@ -73,28 +74,10 @@ def _abilities(unit: type[Unit]) -> str:
     return f" ({'; '.join(marks)})" if marks else ""
 
 
-def _shape(variable: Variable) -> str:
-    place = {Location.GLOBAL: "", Location.NODE: "nodes", Location.ELEMENT: "elements"}[variable.location]
-    return "scalar" if not place else place if variable.components == 1 else f"{place} × {variable.components}"
-
-
-def _note(variable: Variable) -> str:
-    notes = ["once, at initialisation"] if variable.fixed else []
-    notes += [f"only where `{variable.needs}` is not 0"] if variable.needs else []
-    return f" ({', '.join(notes)})" if notes else ""
-
-
 def _accuracy(variable: Variable) -> str:
     if variable.refines is None:
         return ""
     return f" (**accuracy**, {variable.refines.value}: {_REFINED_BY[variable.refines]} makes the error smaller)"
-
-
-def _range(variable: Variable) -> str:
-    if variable.choices:
-        return ", ".join(f"`{choice}`" for choice in variable.choices)
-    bounds = ((">", variable.above), ("≥", variable.at_least), ("<", variable.below))
-    return ", ".join(f"{sign} {bound:g}" for sign, bound in bounds if bound is not None)
 
 
 if __name__ == "__main__":

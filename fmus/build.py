@@ -8,6 +8,7 @@ for every platform that it was compiled for. The archive is compressed.
 import hashlib
 import tempfile
 import uuid
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -19,13 +20,16 @@ from ..units.unit import Unit
 from .annotations import TOOL
 from .archive import write_archive
 from .binaries import binaries
-from .description import model_description
+from .description import check_size, model_description
+from .documents import PACKAGES, documents, rendered, shipped
 from .instance import MESH_FILE
+from .reference_members import reference_members
 
 #: What an FMU carries of this floor; the units' floor goes whole, but for the geometries (the mesh is in the FMU).
 _OWN_FILES = (
     "__init__.py",
     "clock.py",
+    "coordinates.py",
     "instance.py",
     "layout.py",
     "messages.py",
@@ -33,37 +37,6 @@ _OWN_FILES = (
     "saved_state.py",
     "slave.py",
 )
-
-#: load.py of the resources, which the binary runs.
-_LOADER = '''"""Loads the packaged code under a name that is its own."""
-
-import importlib.util
-import sys
-from pathlib import Path
-
-PACKAGE = "{package}"
-
-
-def instantiate(resources, token, fmi):
-    if token != "{token}":
-        raise ValueError("the GUID " + token + " is not that of this FMU; take its modelDescription.xml along with it")
-    try:
-        if PACKAGE not in sys.modules:
-            folder = Path(resources) / PACKAGE
-            spec = importlib.util.spec_from_file_location(
-                PACKAGE, folder / "__init__.py", submodule_search_locations=[str(folder)]
-            )
-            sys.modules[PACKAGE] = importlib.util.module_from_spec(spec)
-        slave = importlib.import_module(PACKAGE + ".fmus.slave")
-    except ModuleNotFoundError as error:
-        del sys.modules[PACKAGE]
-        raise ImportError(
-            "this FMU needs the Python package '" + str(error.name).partition(".")[0] + "', which the Python "
-            + sys.version.split()[0] + " at " + sys.prefix + " does not have; install numpy, scipy, scikit-fem and "
-            "meshio there; hosts without a Python of their own take that of the environment variable COSIM_PYTHON"
-        ) from None
-    return slave.Slave("{unit}", resources, fmi)
-'''
 
 
 @cache
@@ -84,7 +57,12 @@ def fingerprint(unit: type[Unit], mesh: Mesh, fmi: int = 2) -> str:
     digest = hashlib.sha256(f"FMI {fmi} {unit.name} {version(TOOL)} {mesh.fingerprint}".encode())
     # Code that differs in as little as this has another hash, and is never taken for the other.
     own = Path(__file__).parent
-    builders = {str(path.relative_to(own)): path.read_bytes() for path in sorted(own.rglob("*.py"))}
+    builders = {
+        str(path.relative_to(own)): path.read_bytes()
+        for pattern in ("*.py", "templates/*", "icon.*")
+        for path in sorted(own.rglob(pattern))
+    }
+    builders |= {name: shipped(name).encode() for name in ("LICENSE", "CITATION.cff")}
     for name, content in (builders | sources() | binaries(unit.name, fmi)).items():
         digest.update(f"{name} {len(content)} ".encode() + content)
     return digest.hexdigest()
@@ -96,19 +74,24 @@ def guid_of(key: str) -> str:
 
 
 def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path, fmi: int = 2) -> Path:
-    """Write the FMU of `unit` on `mesh`, of FMI 2.0 or (`fmi` is 3) 3.0, to the file `destination` and return it."""
+    """Write the FMU of `unit` on `mesh`, of FMI 2.0 or (`fmi` is 3) 3.0, to the file `destination` and return it.
+
+    InvalidInput where its description would be longer than what readers take; nothing is written then.
+    """
+    check_size(unit, mesh, fmi)
     token = guid_of(fingerprint(unit, mesh, fmi))
     package, code = _package()
+    loader = rendered("load.py.in", unit=unit.name, package=package, token=token, packages=PACKAGES)
     with tempfile.TemporaryDirectory(prefix="cosim-build-") as folder:
         packed = Path(folder) / MESH_FILE
         pack_mesh(mesh, packed)
-        members = {f"resources/{name}": content for name, content in code.items()}
+        members: dict[str, bytes | Iterable[str]] = {f"resources/{name}": content for name, content in code.items()}
         members |= {
-            "modelDescription.xml": model_description(unit, mesh, token, fmi).encode(),
-            "resources/load.py": _LOADER.format(unit=unit.name, package=package, token=token).encode(),
+            "modelDescription.xml": model_description(unit, mesh, token, fmi),
+            "resources/load.py": loader,
             f"resources/{MESH_FILE}": packed.read_bytes(),
         }
-        members |= binaries(unit.name, fmi)
+    members |= binaries(unit.name, fmi) | documents(unit, mesh, fmi) | reference_members(unit, mesh, fmi)
     write_archive(members, destination)
     return destination
 

@@ -24,7 +24,7 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
     taken. One that is damaged, is another, or cannot be read is built anew; as every FMU takes its place in one piece,
     two builders at once do no harm. Without `folder` it is `fmus` in the user's cache of this program.
 
-    OSError where the FMU cannot be built there.
+    OSError where the FMU cannot be built there, InvalidInput where its description would be too long.
     """
     root = folder if folder is not None else user_cache() / "fmus"
     if fmi not in (2, 3):

@@ -17,6 +17,7 @@ from ..units.phase import Phase
 from ..units.registry import UNITS
 from ..units.variable import Causality
 from .clock import Clock
+from .coordinates import Coordinates, coordinates
 from .layout import TIME, Run, layout
 from .references import ArrayReferences, Piece, References, ScalarReferences
 from .saved_state import SavedState
@@ -38,8 +39,11 @@ class UnitInstance:
         self.unit = UNITS[name](mesh)
         self.clock = Clock()
         self._fmi = fmi
-        kind = ScalarReferences if fmi == 2 else ArrayReferences
-        self._references: References = kind(name, layout(type(self.unit), mesh))
+        kind = type(self.unit)
+        runs = layout(kind, mesh)
+        self._references: References = (
+            ScalarReferences(name, runs) if fmi == 2 else ArrayReferences(name, (*runs, *coordinates(kind, mesh)))
+        )
         self._staged: dict[str, FloatArray] = {}
         self._read: dict[str, FloatArray] = {}
         # For the next step: time derivatives of inputs in 1/s (FMI 2.0), or their values at its end (FMI 3.0).
@@ -318,6 +322,8 @@ class UnitInstance:
     def _values(self, run: Run, warnings: list[str]) -> np.ndarray:
         if run is TIME:
             return np.array([self.clock.time])
+        if isinstance(run, Coordinates):
+            return run.values
         name = run.variable.name
         if name not in self._read:
             value = self._output(name, warnings) if run.variable.causality is Causality.OUTPUT else self.unit.get(name)

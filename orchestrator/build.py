@@ -7,15 +7,15 @@ from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
 
-from ..fmus.container import write_container
-from ..fmus.osp import write_osp
-from ..fmus.ssp import write_ssp
-from ..fmus.system import System
 from .assembly import checked_mesh
 from .errors import InputError
 from .participants.native import Mesh, fmu_of_unit, packed_mesh
 from .scenario import Scenario
-from .system import MESH, beyond_the_standard, system_of
+from .ssp.export import write_ssp
+from .systems.container import write_container
+from .systems.of_scenario import MESH, beyond_the_standard, system_of
+from .systems.osp import write_osp
+from .systems.system import System
 from .writing import allowed, make_folder
 
 
@@ -33,12 +33,6 @@ class Built:
     def system(self) -> System:
         """The scenario's units and connections."""
         return system_of(self.scenario, self.base, self.mesh, self.fmus)
-
-    @cached_property
-    def held_system(self) -> System:
-        """The same for masters of which it is known that they set inputs at a step's begin and hold them."""
-        coupling = self.scenario.coupling.model_copy(update={"interpolation": "hold"})
-        return system_of(self.scenario.model_copy(update={"coupling": coupling}), self.base, self.mesh, self.fmus)
 
 
 def build_fmus(scenario: Scenario, base: Path, folder: Path, may_be_none: bool = False, fmi: int = 2) -> Built:
@@ -70,19 +64,15 @@ def write_package(built: Built) -> Path:
 
 
 def write_osp_files(built: Built) -> Path:
-    """Write the system structure for libcosim, and what belongs to it: a unit that ramped inputs there would lag."""
-    return _written(built, lambda: write_osp(built.held_system, built.folder))
+    """Write the system structure for libcosim, and what belongs to it."""
+    return _written(built, lambda: write_osp(built.system, built.folder))
 
 
 def write_container_file(built: Built) -> Path:
-    """Write what fmucontainer makes one FMU of; its inputs are held, as libcosim's are."""
-    return _written(built, lambda: write_container(built.held_system, built.folder))
+    """Write what fmucontainer makes one FMU of."""
+    return _written(built, lambda: write_container(built.system, built.folder))
 
 
 def _written(built: Built, write: Callable[[], Path]) -> Path:
-    try:
-        with allowed(built.folder, "--output"):
-            return write()
-    # What does not fit into a file format; the floor below has no other word for it.
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    with allowed(built.folder, "--output"):
+        return write()

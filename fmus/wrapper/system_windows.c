@@ -103,14 +103,18 @@ int ask(const char *program, const char *question, char *answer, size_t size) {
     if (!CreatePipe(&from, &to, &inherited, 0)) return -1;
     SetHandleInformation(from, HANDLE_FLAG_INHERIT, 0);
     STARTUPINFOW start = {.cb = sizeof start, .dwFlags = STARTF_USESTDHANDLES};
-    start.hStdInput = GetStdHandle(STD_INPUT_HANDLE);
+    /* The host's own streams need not be any, or none that a child inherits. */
+    HANDLE nothing = CreateFileW(L"NUL", GENERIC_READ | GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, &inherited,
+                                 OPEN_EXISTING, 0, NULL);
+    start.hStdInput = nothing;
     start.hStdOutput = to;
-    start.hStdError = GetStdHandle(STD_ERROR_HANDLE);
+    start.hStdError = nothing;
     PROCESS_INFORMATION child;
     wchar_t *line = command_line(program, question);
     BOOL started =
         line != NULL && CreateProcessW(NULL, line, NULL, NULL, TRUE, CREATE_NO_WINDOW, NULL, NULL, &start, &child);
     free(line);
+    CloseHandle(nothing);
     CloseHandle(to);
     size_t length = 0;
     DWORD count = 0, code = 1;

@@ -59,11 +59,11 @@ class Fmi2Calls:
         """See Calls."""
         self._slave.freeInstance()
 
-    def setup_experiment(self) -> None:
+    def setup_experiment(self, start: float) -> None:
         """See Calls."""
-        self._slave.setupExperiment(startTime=0.0)
+        self._slave.setupExperiment(startTime=start)
 
-    def enter_initialization_mode(self) -> None:
+    def enter_initialization_mode(self, start: float) -> None:
         """See Calls."""
         self._slave.enterInitializationMode()
 

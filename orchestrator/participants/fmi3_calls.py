@@ -54,12 +54,12 @@ class Fmi3Calls:
         """See Calls."""
         self._slave.freeInstance()
 
-    def setup_experiment(self) -> None:
+    def setup_experiment(self, start: float) -> None:
         """See Calls; in FMI 3.0 the experiment begins with the initialization mode."""
 
-    def enter_initialization_mode(self) -> None:
+    def enter_initialization_mode(self, start: float) -> None:
         """See Calls."""
-        self._slave.enterInitializationMode(startTime=0.0)
+        self._slave.enterInitializationMode(startTime=start)
 
     def exit_initialization_mode(self) -> None:
         """See Calls."""
@@ -91,7 +91,8 @@ class Fmi3Calls:
         """See Calls."""
         # An enumeration is set as an Int64 (FMI 3.0, section 2.4.4).
         kind = "Int64" if variable.type == "Enumeration" else variable.type
-        getattr(self._slave, f"set{kind}")([variable.valueReference], [value] * prod(variable.shape))
+        values = value if isinstance(value, list) else [value] * prod(variable.shape)
+        getattr(self._slave, f"set{kind}")([variable.valueReference], values)
 
     def step(self, time: float, size: float) -> None:
         """See Calls."""

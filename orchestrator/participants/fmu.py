@@ -18,6 +18,7 @@ from fmpy.fmi1 import FMICallException
 from ...fmus.annotations import FALLBACKS, IMPLEMENTATION
 from ..activity import doing
 from ..errors import InputError, ParticipantError, ParticipantLost, ParticipantTerminated
+from ..quoting import quoted
 from .fmi2_calls import Fmi2Calls
 from .fmi3_calls import Fmi3Calls
 from .fmu_digest import Digest, read_digest
@@ -66,11 +67,11 @@ class Calls(Protocol):
     def free_instance(self) -> None:
         """Free the instance and unload the FMU."""
 
-    def setup_experiment(self) -> None:
-        """Set up an experiment from time 0 on: before any value is set, for some FMUs reset their parameters then."""
+    def setup_experiment(self, start: float) -> None:
+        """Set up an experiment from `start` on: before any value is set, for some FMUs reset their parameters then."""
 
-    def enter_initialization_mode(self) -> None:
-        """Begin the initialization."""
+    def enter_initialization_mode(self, start: float) -> None:
+        """Begin the initialization of an experiment from `start` on."""
 
     def exit_initialization_mode(self) -> None:
         """End it."""
@@ -91,7 +92,7 @@ class Calls(Protocol):
         """Let inputs run over the next step, where the FMU asks for what they are inside of it."""
 
     def set_start(self, variable: Any, value: Any) -> None:
-        """Set a variable of any type, an array to one value everywhere; `variable` is FMPy's."""
+        """Set a variable of any type, an array to one value everywhere or to a list; `variable` is FMPy's."""
 
     def step(self, time: float, size: float) -> None:
         """Advance from `time` by `size`; ParticipantTerminated if the FMU asks for the end of the simulation."""
@@ -130,6 +131,8 @@ class FmuParticipant:
         Values of its parameters, and start values of other variables.
     observe:
         Variables to be recorded, as names or with `*` and `?`.
+    start_s:
+        The time at which it begins.
     loaded:
         False reads the description only: ports and abilities are known, and nothing of the FMU's code is run.
     """
@@ -142,8 +145,10 @@ class FmuParticipant:
         start: Parameters | None = None,
         observe: Sequence[str] = (),
         loaded: bool = True,
+        start_s: float = 0.0,
     ) -> None:
         self.name = name
+        self._start_s = start_s
         self._calls: Calls | None = None
         self._initialized = False
         #: Whether the FMU returned an error that nothing has brought it back from.
@@ -199,7 +204,7 @@ class FmuParticipant:
     def begin(self) -> None:
         """See Participant."""
         with self._blaming_input():
-            self._call(lambda calls: calls.enter_initialization_mode())
+            self._call(lambda calls: calls.enter_initialization_mode(self._start_s))
         for variable, value in self._input_starts:
             self._set_values([variable], {variable.name: value}, "start value")
 
@@ -454,9 +459,9 @@ class FmuParticipant:
 
     def _set_up(self) -> None:
         try:
-            self._call(lambda calls: calls.setup_experiment())
+            self._call(lambda calls: calls.setup_experiment(self._start_s))
         except ParticipantError as error:
-            raise InputError(f"the FMU takes no experiment that begins at 0 s: {error}") from None
+            raise InputError(f"the FMU takes no experiment that begins at {self._start_s:g} s: {error}") from None
 
     def _set_values(self, variables: Any, values: Parameters, what: str) -> None:
         declared = {variable.name: variable for variable in variables}
@@ -465,7 +470,7 @@ class FmuParticipant:
                 self._call(partial(_set_start, declared[name], value))
             except ParticipantError as error:
                 kind = declared[name].type
-                raise InputError(f"{what} '{name}' of type {kind} cannot be {value!r}: {error}") from None
+                raise InputError(f"{what} '{name}' of type {kind} cannot be {quoted(value)}: {error}") from None
 
 
 def _abilities(declared: Any, memoryless: bool) -> Abilities:

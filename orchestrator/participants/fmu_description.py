@@ -8,7 +8,7 @@ and system packages read all FMUs through here.
 import gc
 import io
 import zipfile
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
@@ -124,12 +124,12 @@ def read_description(file: FmuFile) -> Description:
                     element.get("name"): element.get("relativeQuantity") in _TRUE
                     for element in root.iterfind("ModelVariables/*[@relativeQuantity]")
                 }
-                updated = {
+                intermediate = {
                     element.get("name")
                     for element in root.iterfind("ModelVariables/*[@intermediateUpdate]")
                     if element.get("intermediateUpdate") in _TRUE
                 }
-                variables = [_of_fmpy(variable, relative, updated) for variable in head.modelVariables]
+                variables = [_of_fmpy(variable, relative, intermediate) for variable in head.modelVariables]
         except InputError:
             raise
         # FMPy raises plain Exceptions.
@@ -241,7 +241,7 @@ def _variable(element: Any, types: Mapping[str, Any]) -> Variable:
     )
 
 
-def _of_fmpy(variable: Any, relative: Mapping[str, bool], updated: Collection[str]) -> Variable:
+def _of_fmpy(variable: Any, relative: Mapping[str, bool], intermediate: Set[str]) -> Variable:
     kind = variable.declaredType
     return Variable(
         variable.name,
@@ -253,10 +253,11 @@ def _of_fmpy(variable: Any, relative: Mapping[str, bool], updated: Collection[st
         variable.unit or (None if kind is None else kind.unit),
         variable.start,
         variable.shape,
-        # FMPy 0.3.32 looks for this attribute among the children of the element, for the last one nowhere.
+        # FMPy 0.3.32 looks for the attribute among the children of the element, and never finds it.
         relative.get(variable.name, bool(kind is not None and kind.relativeQuantity)),
         kind,
-        variable.name in updated,
+        # And this one FMPy never looks for.
+        variable.name in intermediate,
     )
 
 

@@ -174,8 +174,15 @@ def check_start(start: Parameters, variables: Iterable[Any]) -> None:
 
 
 def _check_type(what: str, variable: Any, value: Any) -> None:
-    if not _accepts(variable.type, value):
-        raise InputError(f"{what} of type {variable.type} cannot be {value!r}")
+    values = value if isinstance(value, list) else [value]
+    if isinstance(value, list) and (not variable.shape or len(value) != prod(variable.shape)):
+        raise InputError(
+            f"{what} has {len(value)} values, but the variable has "
+            + (f"{prod(variable.shape)}, of the shape {variable.shape}" if variable.shape else "one")
+        )
+    for each in values:
+        if not _accepts(variable.type, each):
+            raise InputError(f"{what} of type {variable.type} cannot be {each!r}")
 
 
 class Group(NamedTuple):

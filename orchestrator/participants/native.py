@@ -237,8 +237,14 @@ def located(mesh: Mesh, points_mm: Sequence[Sequence[float]]) -> Places:
 
 
 def fmu_of_unit(unit: str, mesh: Mesh, fmu_dir: Path | None, fmi: int = 2) -> Path:
-    """The FMU of a unit on `mesh`, of FMI 2.0 or 3.0: from the cache if it is there, built otherwise."""
-    return cached_fmu(UNITS[unit], mesh, fmu_dir, fmi)
+    """The FMU of a unit on `mesh`, of FMI 2.0 or 3.0: from the cache if it is there, built otherwise.
+
+    InputError for a mesh on which its description would be too long.
+    """
+    try:
+        return cached_fmu(UNITS[unit], mesh, fmu_dir, fmi)
+    except InvalidInput as error:
+        raise InputError(str(error)) from None
 
 
 class NativeParticipant:

@@ -50,6 +50,14 @@ def _scalar(value: Any) -> Any:
     return value
 
 
+def _value(value: Any) -> Any:
+    if not isinstance(value, list):
+        return _scalar(value)
+    if not value:
+        raise ValueError("expected the values of an array, not an empty list")
+    return [_scalar(each) for each in value]
+
+
 def _name(name: str) -> str:
     if (size := len(name.encode())) > _LONGEST_NAME:
         raise ValueError(f"a name of {size} bytes; files are called after it, so more than {_LONGEST_NAME} are refused")
@@ -63,7 +71,8 @@ def _path(path: str) -> str:
     return path
 
 
-Scalar = Annotated[Any, AfterValidator(_scalar)]
+#: A number, a text or a truth value, or of an array the list of them, in row-major order.
+Value = Annotated[Any, AfterValidator(_value)]
 FilePath = Annotated[str, AfterValidator(_path)]
 
 #: More of anything that is counted is a slip of the pen.
@@ -143,13 +152,14 @@ class Scene(_Section):
 class UnitEntry(_Section):
     """One participant: a unit of this project by name, or any FMI 2.0 or 3.0 co-simulation FMU by path.
 
-    `start` gives start values to variables of an FMU; `every` steps the unit at every so-many-th exchange only.
+    `start` gives start values to variables of an FMU; a value for an array is that of all its elements, a list has one
+    for each. `every` steps the unit at every so-many-th exchange only.
     """
 
     unit: str | None = None
     fmu: FilePath | None = None
-    parameters: dict[str, Scalar] = Field(default_factory=dict)
-    start: dict[str, Scalar] = Field(default_factory=dict)
+    parameters: dict[str, Value] = Field(default_factory=dict)
+    start: dict[str, Value] = Field(default_factory=dict)
     every: Annotated[int, Field(ge=1, le=_MOST)] = 1
 
     @model_validator(mode="after")

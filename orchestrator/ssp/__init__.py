@@ -1,4 +1,4 @@
-"""System packages (SSP 1.0) as scenarios."""
+"""System packages (SSP 1.0 and 2.0) as scenarios."""
 
 from .package import open_package
 

@@ -2,17 +2,19 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import prod
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ...fmus.ssp import NAMESPACES
 from ..coupling.connections import Law
 from ..errors import InputError
 from ..quoting import shortened
+from .connector import WHOLE, written
 from .file import check, inside, member, named, parsed, read
 from .tree import Binding
 from .unit_conversion import Measure
+from .vocabulary import NAMESPACES
 from .wiring import linear_law
 
 _SET, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"
@@ -22,13 +24,15 @@ _SET, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter
 class Entry:
     """A parameter as it stands in a set: its name, its type, its value as text, and its unit of measure.
 
-    `law` is what becomes of its value after any conversion of units, which is not done where it is `suppressed`.
+    An array has a text for each element, in row-major order of `shape`. `law` is what becomes of its values after any
+    conversion of units, which is not done where it is `suppressed`.
     """
 
     name: str
     kind: str
-    text: str
+    texts: tuple[str, ...]
     unit: Measure | None
+    shape: tuple[int, ...] = ()
     law: Law | None = None
     suppressed: bool = False
 
@@ -85,11 +89,34 @@ class _Sources:
 
 def _entry(parameter: Any, prefix: str, units: dict[str, Measure], where: str) -> Entry:
     name = prefix + parameter.get("name")
-    value = next(child for child in parameter if child.tag != f"{{{NAMESPACES['ssc']}}}Annotations")
+    value = next(parameter.iterchildren(f"{{{NAMESPACES['ssv']}}}*"))
     kind, unit = value.tag.partition("}")[2], value.get("unit")
+    what = f"{where}: '{shortened(name)}'"
     if kind == "Binary":
-        raise InputError(f"{where}: '{shortened(name)}' is of the type Binary, which FMI 2.0 does not have")
-    return Entry(name, kind, value.get("value"), None if unit is None else units.get(unit, Measure(unit)))
+        raise InputError(f"{what} is of the type Binary, which scenarios have no words for; leave it out")
+    shape, texts = _shape(parameter, what), _texts(value, kind, what)
+    if len(texts) != prod(shape):
+        raise InputError(f"{what} has {len(texts)} values, but is {written(shape)}; correct its dimensions")
+    measure = None if unit is None else units.get(unit, Measure(unit))
+    return Entry(name, kind, texts, measure, shape)
+
+
+def _shape(parameter: Any, what: str) -> tuple[int, ...]:
+    """The dimensions of a parameter, whose sizes have to be numbers (SSP 2.0, section on dimensions)."""
+    dimensions = list(named(parameter, "ssc:Dimension"))
+    if any(each.get("size") is None or each.get("sizeConnector") is not None for each in dimensions):
+        raise InputError(f"{what} has a dimension without a size of its own; a parameter set gives all sizes")
+    return tuple(int(each.get("size")) for each in dimensions)
+
+
+def _texts(value: Any, kind: str, what: str) -> tuple[str, ...]:
+    """The values of a parameter's elements; texts and items stand in one attribute, or each in an element."""
+    text, elements = value.get("value"), [each.get("value") for each in named(value, "ssv:Value")]
+    if (text is None) != bool(elements):
+        raise InputError(f"{what} has either no value or two; give it an attribute `value` or elements Value")
+    if text is None:
+        return tuple(elements)
+    return (text,) if kind in ("String", "Enumeration") else tuple(text.split())
 
 
 def _mapped(mapping: tuple[Any, str], found: list[Entry], tell: Callable[[str], None]) -> Iterator[Entry]:
@@ -110,25 +137,23 @@ def _mapped(mapping: tuple[Any, str], found: list[Entry], tell: Callable[[str], 
         yield replace(
             entry,
             name=target,
-            text=_looked_up(item, entry, what),
+            texts=_looked_up(item, entry, what),
             law=linear_law(item, what),
             suppressed=item.get("suppressUnitConversion", "false") in ("true", "1"),
         )
 
 
-def _looked_up(item: Any, entry: Entry, what: str) -> str:
-    """The value by the table that the mapping may have for its type."""
+def _looked_up(item: Any, entry: Entry, what: str) -> tuple[str, ...]:
+    """The values by the table that the mapping may have for their type; those that it does not name are kept."""
     for kind in ("Boolean", "Integer", "Enumeration"):
         rows = list(named(item, f"ssc:{kind}MappingTransformation/ssc:MapEntry"))
         if not rows:
             continue
-        if entry.kind != kind:
+        if entry.kind != kind and not (kind == "Integer" and entry.kind in WHOLE):
             raise InputError(f"{what} has a table for the type {kind}, but it is of the type {entry.kind}")
         table = {_plain(row.get("source"), kind): row.get("target") for row in rows}
-        if _plain(entry.text, kind) not in table:
-            raise InputError(f"{what} has no entry for its value '{shortened(entry.text)}'")
-        return str(table[_plain(entry.text, kind)])
-    return entry.text
+        return tuple(str(table.get(_plain(text, kind), text)) for text in entry.texts)
+    return entry.texts
 
 
 def _plain(text: str, kind: str) -> Any:

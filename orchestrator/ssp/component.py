@@ -16,12 +16,15 @@ from .unit_conversion import Measure
 
 _FMU = "application/x-fmu-sharedlibrary"
 
+#: The other ways to run an FMU, in words.
+_OTHER = {"ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
+
 
 class SystemComponent:
     """The component `element` in the folder `base` of the unpacked `package`; `unit` is its name in the scenario.
 
     `place` are the names of the systems that it is in, and its own. InputError if it is none that can be coupled:
-    another kind of component, or no FMI 2.0 co-simulation FMU.
+    another kind of component, or no co-simulation FMU of FMI 2.0 or 3.0.
     """
 
     def __init__(self, element: Any, unit: str, place: tuple[str, ...], base: Path, package: Path) -> None:
@@ -31,8 +34,10 @@ class SystemComponent:
         kind = element.get("type", _FMU)
         if kind != _FMU:
             raise InputError(f"component '{self.label}' is of the type {shortened(kind)}; only FMUs can be coupled")
-        if element.get("implementation", "any") == "ModelExchange":
-            raise InputError(f"component '{self.label}' is to be run by model exchange; only co-simulation is possible")
+        implementation = element.get("implementation", "any")
+        if implementation in _OTHER:
+            words = _OTHER[implementation]
+            raise InputError(f"component '{self.label}' is to be run by {words}; only co-simulation is possible")
         path = inside(base, element.get("source"), f"the FMU of component '{self.label}'", package)
         #: The FMU, relative to the unpacked package.
         self.source = path.relative_to(package).as_posix()
@@ -50,14 +55,18 @@ class SystemComponent:
         return named(self.element, "ssd:ParameterBindings/ssd:ParameterBinding")
 
     @cached_property
-    def scalars(self) -> dict[str, tuple[Port, int]]:
-        """By the name of an input or output, the field that it is part of, and its place in that."""
-        return {
-            scalar: (field.port, place)
-            for causality in ("input", "output")
-            for field in fields(self.description, groups(self.description.modelVariables, (causality,)), {}).values()
-            for place, scalar in enumerate(field.port.elements)
-        }
+    def pins(self) -> dict[str, tuple[Port, int | None]]:
+        """By the name of an input or output, the field that it is part of and its place in that; None for all of it."""
+        pins: dict[str, tuple[Port, int | None]] = {}
+        for causality in ("input", "output"):
+            found = groups(self.description.modelVariables, (causality,))
+            for name, field in fields(self.description, found, {}).items():
+                # An array of FMI 3.0 is one variable.
+                if name in self.variables and self.variables[name].shape:
+                    pins[name] = field.port, None
+                else:
+                    pins |= {scalar: (field.port, place) for place, scalar in enumerate(field.port.elements)}
+        return pins
 
     def measure(self, name: str) -> Measure | None:
         """The unit of the variable `name`, its own or that of its type, if it has one."""
@@ -82,9 +91,6 @@ class SystemComponent:
 
 def _described(path: Path, what: str) -> Description:
     try:
-        description = read_description(FmuFile(path))
+        return read_description(FmuFile(path))
     except InputError as error:
         raise InputError(f"{what}: {error}") from None
-    if description.fmiVersion != "2.0":
-        raise InputError(f"{what}: an FMU of FMI {description.fmiVersion}; only those of FMI 2.0 are taken in packages")
-    return description

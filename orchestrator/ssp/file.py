@@ -1,7 +1,6 @@
-"""The files of a system package: unpacked, found and read, and checked against the standard's schemas."""
+"""The files of a system package: unpacked, found and read, and checked against the schemas of SSP 1.0 or 2.0."""
 
 from collections.abc import Iterator
-from copy import deepcopy
 from functools import cache
 from math import isfinite
 from os.path import normpath
@@ -12,11 +11,11 @@ from urllib.parse import unquote
 import fmpy
 from lxml import etree
 
-from ...fmus.ssp import NAMESPACES, STRUCTURE
 from ..errors import InputError
 from ..quoting import quoted, shortened
 from ..untrusted.archive import LARGEST_MEMBER, open_archive
 from ..untrusted.document import parse_document
+from .vocabulary import NAMESPACES, STRUCTURE
 
 #: Those of parameter mappings are read only.
 _NAMESPACES = NAMESPACES | {"ssm": "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"}
@@ -27,12 +26,8 @@ _SCHEMAS = {
     "ssm": "SystemStructureParameterMapping.xsd",
 }
 
-#: The elements that say which version of the standard they follow.
-_VERSIONED = (
-    f"{{{_NAMESPACES['ssd']}}}SystemStructureDescription",
-    f"{{{_NAMESPACES['ssv']}}}ParameterSet",
-    f"{{{_NAMESPACES['ssm']}}}ParameterMapping",
-)
+#: Where the schemas of each version are; FMPy has those of 1.0.
+_FOLDERS = {"1.0": Path(fmpy.__file__).parent / "ssp" / "schema", "2.0": Path(__file__).parent / "schemas"}
 
 #: Characters of a schema's complaint that are repeated; it quotes values of any length.
 _LONGEST_PROBLEM = 300
@@ -57,7 +52,7 @@ def unpack(path: Path, folder: Path) -> Any:
 
 
 def read(path: Path, kind: str, name: str) -> Any:
-    """The root of an XML file of SSP 1.0, of the `kind` ssd, ssv or ssm; InputError says what is wrong, and where."""
+    """The root of an XML file of SSP, of the `kind` ssd, ssv or ssm; InputError says what is wrong, and where."""
     with path.open("rb") as file:
         content = file.read(LARGEST_MEMBER + 1)
     return parsed(content, kind, name)
@@ -76,27 +71,34 @@ def parsed(content: bytes, kind: str, name: str) -> Any:
 
 
 def check(element: Any, kind: str, name: str) -> None:
-    """InputError if `element` does not follow the schema of its `kind`.
-
-    A file of SSP 2.0 is read if it is one of SSP 1.0 but for its version; what is new in it is refused by its name.
-    """
-    schema, copied = _schema(kind), deepcopy(element)
-    for item in copied.iter(*_VERSIONED):
-        if item.get("version") == "2.0":
-            item.set("version", "1.0")
-    if not schema.validate(etree.ElementTree(copied)):
+    """InputError if `element` does not follow the schema of its `kind`, in the version of SSP that it names."""
+    version = _version(element, name)
+    schema = _schema(kind, version)
+    if not schema.validate(etree.ElementTree(element)):
         problem = schema.error_log[0]
         message = shortened(problem.message, _LONGEST_PROBLEM)
-        raise InputError(f"{name}, line {problem.line}: not as SSP 1.0 has it: {message}")
+        raise InputError(f"{name}, line {problem.line}: not as SSP {version} has it: {message}")
+
+
+def _version(element: Any, name: str) -> str:
+    """`1.0` or `2.0`; what no file of SSP has, or one without any, is left to the schema of 1.0."""
+    text = element.get("version", "1.0")
+    if text == "2.0":
+        return text
+    if not text.startswith("1."):
+        raise InputError(
+            f"{name}: it is of SSP {shortened(text)}, which is not supported; export it by SSP {' or '.join(_FOLDERS)}"
+        )
+    return "1.0"
 
 
 @cache
-def _schema(kind: str) -> Any:
-    return etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp" / "schema" / _SCHEMAS[kind]))
+def _schema(kind: str, version: str) -> Any:
+    return etree.XMLSchema(file=str(_FOLDERS[version] / _SCHEMAS[kind]))
 
 
 def named(element: Any, path: str) -> Iterator[Any]:
-    """The elements at `path`, with the prefixes of SSP 1.0."""
+    """The elements at `path`, with the prefixes of SSP."""
     yield from element.iterfind(path, _NAMESPACES)
 
 

@@ -1,4 +1,4 @@
-"""Scenarios from system packages (SSP 1.0): this project's own, which say how they are coupled, and those of others."""
+"""Scenarios from system packages (SSP 1.0, 2.0): this project's own, which say how they are coupled, and others'."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -8,7 +8,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ...fmus.ssp import ANNOTATION
 from ..coupling.connections import Connection
 from ..errors import InputError
 from ..quoting import quoted, shortened
@@ -18,6 +17,7 @@ from .connections import connections
 from .file import inside, named, unpack
 from .parameters import parameters
 from .tree import identifier, tree
+from .vocabulary import ANNOTATION
 from .wiring import Wiring
 
 _MS_PER_S = 1000.0

@@ -1,4 +1,4 @@
-"""The parameter values of a system package: its bindings, applied to components and connectors as SSP 1.0 says.
+"""The parameter values of a system package: its bindings, applied to components and connectors as the standard says.
 
 Bindings of a system go before those of what is in it, later ones before earlier ones. What the standard lets a tool
 ignore, a name that no variable has, is told; what is not supported is refused by its name.
@@ -14,6 +14,7 @@ from ..errors import InputError, did_you_mean
 from ..quoting import shortened
 from .binding import Entry, entries
 from .component import SystemComponent
+from .connector import REAL, WHOLE, written
 from .tree import Binding, SystemNode
 from .unit_conversion import Measure, chained, conversion
 from .wiring import Hop, Pin, Wiring
@@ -77,7 +78,8 @@ class _Bound:
             for number, hop in enumerate(hops):
                 if hop.source in self._at:
                     used.add(hop.source)
-                    self.given[part.unit][pin.name] = self._passed(hop.source, hops[number:], _Wanted(part, pin.name))
+                    wanted = _Wanted(part, pin.name)
+                    self._keep(wanted, self._passed(hop.source, hops[number:], wanted))
                     break
         for pin in self._at.keys() - used:
             self._tell(f"the connector '{pin}' gives its parameter value to nobody; it is not used")
@@ -101,8 +103,19 @@ class _Bound:
         if name not in part.variables:
             return False
         law = entry.law if entry.suppressed else chained(_converted(entry, part, name), entry.law)
-        self.given[part.unit][name] = _value(replace(entry, law=law), _Wanted(part, name))
+        self._keep(_Wanted(part, name), _value(replace(entry, law=law), _Wanted(part, name)))
         return True
+
+    def _keep(self, wanted: _Wanted, value: Any) -> None:
+        """Keep a value for a component; of a structural parameter only the one that it has anyway."""
+        variable = wanted.part.variables[wanted.name]
+        if variable.causality != "structuralParameter":
+            self.given[wanted.part.unit][wanted.name] = value
+        elif f"{value:.17g}" != variable.start:
+            raise InputError(
+                f"'{wanted.label}' is a structural parameter, which keeps its start value {variable.start} here, but "
+                f"the package gives {value}; remove that, or export the FMU with this size"
+            )
 
     def _passed(self, pin: Pin, hops: Sequence[Hop], wanted: _Wanted) -> Any:
         """The value of the connector `pin` of a system, as it arrives."""
@@ -126,9 +139,20 @@ def _converted(entry: Entry, part: SystemComponent, name: str) -> Law | None:
 
 
 def _value(entry: Entry, wanted: _Wanted) -> Any:
-    """The value in the type and unit of the variable."""
-    if entry.kind in ("Real", "Integer") and (entry.kind == "Real" or entry.law is not None):
-        number = float(entry.text)
+    """The value in the type and unit of the variable: of an array a list, or one value that all elements have."""
+    shape = wanted.part.variables[wanted.name].shape
+    if entry.shape != shape:
+        raise InputError(
+            f"parameter '{shortened(entry.name)}' is {written(entry.shape)}, but '{wanted.label}' is {written(shape)}; "
+            "correct its dimensions"
+        )
+    values = [_element(text, entry, wanted) for text in entry.texts]
+    return values if len(set(values)) != 1 else values[0]
+
+
+def _element(text: str, entry: Entry, wanted: _Wanted) -> Any:
+    if entry.kind in REAL or (entry.kind in WHOLE and entry.law is not None):
+        number = float(text)
         if entry.law is not None:
             number = entry.law.factor * number + entry.law.offset
         if not isfinite(number):
@@ -139,16 +163,13 @@ def _value(entry: Entry, wanted: _Wanted) -> Any:
             f"parameter '{shortened(entry.name)}' is of the type {entry.kind}, which no linear transformation is for"
         )
     if entry.kind == "Enumeration":
-        declared = wanted.part.variables[wanted.name].declaredType
-        items = {} if declared is None else {item.name: item.value for item in declared.items or ()}
-        if entry.text not in items:
+        items = {name: number for number, name in wanted.part.variables[wanted.name].items.items()}
+        if text not in items:
             raise InputError(
-                f"'{wanted.label}' has no item '{shortened(entry.text)}'"
-                + (did_you_mean(entry.text, items) if items else " (known: none, it is no enumeration)")
+                f"'{wanted.label}' has no item '{shortened(text)}'"
+                + (did_you_mean(text, items) if items else " (known: none, it is no enumeration)")
             )
-        return int(items[entry.text])
-    if entry.kind == "Integer":
-        return int(entry.text)
-    if entry.kind == "Boolean":
-        return entry.text in ("true", "1")
-    return entry.text
+        return items[text]
+    if entry.kind in WHOLE:
+        return int(text)
+    return text in ("true", "1") if entry.kind == "Boolean" else text

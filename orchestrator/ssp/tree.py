@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ...fmus.ssp import NAMESPACES
 from ..errors import InputError
 from ..quoting import shortened
 from .component import SystemComponent
 from .file import inside, named, read, unpack
 from .unit_conversion import Measure
+from .vocabulary import NAMESPACES
 
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
 
@@ -92,8 +92,8 @@ def tree(root: Any, package: Path) -> SystemNode:
     Raises
     ------
     InputError
-        For signal dictionaries, components that are no FMI 2.0 co-simulation FMUs, names that stand twice, and systems
-        nested without an end.
+        For signal dictionaries, components that are no co-simulation FMUs, names that stand twice, and systems nested
+        without an end.
     """
     whole = _Growth(package).system(next(named(root, "ssd:System")), (), Source.of(root, package, package))
     if next(whole.components(), None) is None:
@@ -137,6 +137,11 @@ class _Growth:
             if label in node.parts:
                 raise InputError(f"{node.label} has two elements '{shortened(label)}'; rename one")
             place = (*path, label)
+            if kind == "Component" and part.get("source") is None:
+                raise InputError(
+                    f"component '{shortened('.'.join(place))}' has no source, so there is nothing of it to run; give "
+                    "it an FMU"
+                )
             if kind == "System":
                 node.parts[label] = self.system(part, place, source)
             elif part.get("type") in (_DEFINITION, _PACKAGE):

@@ -8,14 +8,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...fmus.ssp import NAMESPACES
 from ..coupling.connections import Law
 from ..errors import InputError, did_you_mean
 from ..quoting import shortened
 from .component import SystemComponent
+from .connector import Sizes, check_connector, sizes, unit_of
 from .file import named, number
 from .tree import SystemNode
 from .unit_conversion import Measure, chained, conversion
+from .vocabulary import NAMESPACES
 
 _TRANSFORMATIONS = ("BooleanMappingTransformation", "IntegerMappingTransformation", "EnumerationMappingTransformation")
 
@@ -50,7 +51,7 @@ class Wiring:
     ------
     InputError
         For connectors that nobody has, kinds and types that cannot be coupled, connections that do not go from an
-        output to an input, and two sources of one input.
+        output to an input or are of single elements of arrays, and two sources of one input.
     """
 
     def __init__(self, whole: SystemNode) -> None:
@@ -94,9 +95,12 @@ class Wiring:
         """The unit of measure of a connector; that of a component's is its variable's."""
         if pin.path in self.components:
             return self.components[pin.path].measure(pin.name)
-        real = self._connectors[pin.path][pin.name].find("ssc:Real", NAMESPACES)
-        unit = None if real is None else real.get("unit")
+        unit = unit_of(self._connectors[pin.path][pin.name])
         return None if unit is None else self.systems[pin.path].source.measures.get(unit, Measure(unit))
+
+    def sizes(self, pin: Pin) -> Sizes:
+        """The dimensions that a connector of a system says; those that a parameter of the system gives are unknown."""
+        return sizes(self._connectors[pin.path][pin.name], lambda _: None, f"connector '{pin}'")
 
     def _followed(self, pin: Pin) -> list[Hop]:
         hops: list[Hop] = []
@@ -113,6 +117,12 @@ class Wiring:
         ends: dict[bool, Pin] = {}
         for side in ("start", "end"):
             label, name = _element(element, side), element.get(f"{side}Connector")
+            if element.get(f"{side}Indices") is not None:
+                raise InputError(
+                    f"the connection of {_end(node, element, 'start')} to {_end(node, element, 'end')} has "
+                    f"{side}Indices, and the standard does not say whether those count from 0 or 1; connect the whole "
+                    "arrays"
+                )
             if label is not None and label not in node.parts:
                 raise InputError(
                     f"a connection names the component '{shortened(label)}'{did_you_mean(label, node.parts)}"
@@ -126,7 +136,7 @@ class Wiring:
             if kind not in (*_IN, *_OUT):
                 raise InputError(f"connector '{pin}' is of the kind {kind}; only outputs and inputs are exchanged")
             if pin.path in self.components:
-                _check(self.components[pin.path], name, kind)
+                check_connector(self.components[pin.path], name, kind)
             # Seen from inside, the inputs of a system are where values come from.
             ends[(kind in _OUT) == (label is not None)] = pin
         if len(ends) != 2:
@@ -145,23 +155,6 @@ def _element(element: Any, side: str) -> str | None:
 def _end(node: SystemNode, element: Any, side: str) -> Pin:
     label = _element(element, side)
     return Pin(node.path if label is None else (*node.path, label), element.get(f"{side}Connector"))
-
-
-def _check(part: SystemComponent, name: str, kind: str) -> None:
-    """InputError if the connector is not what its FMU says."""
-    variable = part.variables.get(name)
-    label = f"connector '{part.label}.{shortened(name)}'"
-    if variable is None or variable.causality != kind:
-        raise InputError(f"{label} is of the kind {kind}, but the FMU {part.source} has no {kind} of that name")
-    if kind != "parameter" and name not in part.scalars:
-        raise InputError(f"{label} is of the type {variable.type}, which is not exchanged")
-    real, declared = part.connectors[name].find("ssc:Real", NAMESPACES), part.measure(name)
-    shown = None if real is None else real.get("unit")
-    if shown is not None and declared is not None and shown != declared.name:
-        raise InputError(
-            f"{label} is in {shortened(shown)}, but the FMU {part.source} says {shortened(declared.name)}; "
-            "give the connector the unit of the variable"
-        )
 
 
 def _law(hop: Hop, current: Measure | None, target: Measure | None, relative: bool) -> Law | None:

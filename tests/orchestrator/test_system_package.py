@@ -13,14 +13,16 @@ import build_body
 import h5py
 import numpy as np
 import pytest
-from cardiac_cosim.orchestrator import stopping
+from cardiac_cosim.orchestrator import ssp, stopping
 from cardiac_cosim.orchestrator.errors import InputError
 from cardiac_cosim.orchestrator.ssp import open_package
 from fmpy.ssp import simulation
 from fmpy.ssp.ssd import read_ssd
+from lxml import etree
 
 _ROOT = Path(__file__).parent.parent.parent
 _SCENARIOS = _ROOT / "scenarios"
+_SCHEMAS = Path(ssp.__file__).parent / "schemas"
 _COARSE = ("scene.mesh_size_mm=4", "run.stop_ms=20")
 
 Cosim = Callable[..., Any]
@@ -30,8 +32,8 @@ def _set(*assignments: str) -> list[str]:
     return [word for assignment in assignments for word in ("--set", assignment)]
 
 
-def _package(cosim: Cosim, scenario: Path, folder: Path, *assignments: str) -> Path:
-    ended = cosim("build", scenario, "--output", folder, "--ssp", *_set(*assignments))
+def _package(cosim: Cosim, scenario: Path, folder: Path, *assignments: str, fmi: int = 2) -> Path:
+    ended = cosim("build", scenario, "--output", folder, "--ssp", "--fmi", str(fmi), *_set(*assignments))
     assert ended.code == 0, ended.err
     (path,) = folder.glob("*.ssp")
     assert str(path) in ended.out.splitlines()
@@ -48,25 +50,36 @@ def _fields(folder: Path) -> dict[str, np.ndarray]:
 # --- our own packages -------------------------------------------------------------------------------------------------
 
 
+_ITERATED = "coupling.iterate={acceleration: anderson, converge: {stretch: {relative: 1e-6}}}"
+
+
 @pytest.mark.parametrize(
-    ("scene", "assignments"),
+    ("scene", "assignments", "fmi"),
     [
-        ("cell", ("run.stop_ms=30",)),
-        ("strand", _COARSE),
-        ("strand", (*_COARSE, "coupling.scheme=jacobi", "coupling.interpolation=linear", "coupling.extrapolation=1")),
+        ("cell", ("run.stop_ms=30",), 2),
+        ("cell", ("run.stop_ms=30",), 3),
+        ("strand", _COARSE, 2),
+        ("strand", _COARSE, 3),
+        (
+            "strand",
+            (*_COARSE, "coupling.scheme=jacobi", "coupling.interpolation=linear", "coupling.extrapolation=1"),
+            2,
+        ),
         (
             "strand",
             (*_COARSE, "units.mechanics.every=4", "coupling.order=[mechanics, electrophysiology, active_stress]"),
+            3,
         ),
-        ("strand", (*_COARSE, "coupling.adaptive={tolerance: 0.05, min_ms: 0.5, max_ms: 5}")),
-        ("strand", (*_COARSE, "coupling.iterate={acceleration: anderson, converge: {stretch: {relative: 1e-6}}}")),
+        ("strand", (*_COARSE, "coupling.adaptive={tolerance: 0.05, min_ms: 0.5, max_ms: 5}"), 2),
+        ("strand", (*_COARSE, _ITERATED), 2),
+        ("strand", (*_COARSE, _ITERATED, "coupling.interpolation=linear"), 3),
     ],
 )
 def test_a_scenario_runs_from_its_package_to_the_same_bits(
-    scene: str, assignments: tuple[str, ...], cosim: Cosim, tmp_path: Path
+    scene: str, assignments: tuple[str, ...], fmi: int, cosim: Cosim, tmp_path: Path
 ) -> None:
     scenario = _SCENARIOS / f"{scene}.yaml"
-    package = _package(cosim, scenario, tmp_path / "built", *assignments)
+    package = _package(cosim, scenario, tmp_path / "built", *assignments, fmi=fmi)
     for source, name, sets in ((scenario, "yaml", assignments), (package, "ssp", ())):
         ended = cosim("run", source, "--output", tmp_path / name, *_set(*sets))
         assert ended.code == 0, ended.err
@@ -79,8 +92,9 @@ def test_a_scenario_runs_from_its_package_to_the_same_bits(
         np.testing.assert_array_equal(values, after[name], err_msg=name)
 
 
-def test_a_package_of_a_package_is_the_same_package(cosim: Cosim, tmp_path: Path) -> None:
-    first = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "first", *_COARSE)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_package_of_a_package_is_the_same_package(fmi: int, cosim: Cosim, tmp_path: Path) -> None:
+    first = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "first", *_COARSE, fmi=fmi)
     again = _package(cosim, first, tmp_path / "again")
     assert first.read_bytes() == again.read_bytes()
 
@@ -128,7 +142,11 @@ def test_another_tool_may_change_what_the_standard_has_a_place_for(cosim: Cosim,
 
 
 def test_packages_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
-    sets = (*_COARSE, "units.electrophysiology.parameters.refine=1", "coupling.interpolation=linear")
+    sets = (
+        *_COARSE,
+        "units.electrophysiology.parameters.refine=1",
+        "units.active_stress.parameters.time_integration=exact",
+    )
     package = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "built", *sets)
     # FMPy validates it, and the parameter sets, against the schemas of SSP 1.0.
     ssd = read_ssd(str(package), validate=True)
@@ -151,8 +169,7 @@ def test_packages_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
         ("electrophysiology", "stimulus_x_min_mm"): ("Real", "-1.0", "mm"),
         ("electrophysiology", "stimulus_x_max_mm"): ("Real", "8.0", "mm"),
         ("electrophysiology", "refine"): ("Integer", "1", None),
-        ("electrophysiology", "input_interpolation"): ("String", "linear", None),
-        ("active_stress", "input_interpolation"): ("String", "linear", None),
+        ("active_stress", "time_integration"): ("String", "exact", None),
     }
     units = {unit.name: unit for unit in ssd.units}
     assert (units["mV"].kg, units["mV"].m, units["mV"].s, units["mV"].A, units["mV"].factor) == (1, 2, -3, -1, 1e-3)
@@ -164,6 +181,73 @@ def test_packages_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
     fed = {(element, connector) for _, _, element, connector in ends}
     inputs = {(c.name, k.name) for c in components.values() for k in c.connectors if k.kind == "input"}
     assert inputs == fed
+
+
+def test_packages_of_fmi_3_follow_the_standard(cosim: Cosim, tmp_path: Path) -> None:
+    sets = (
+        *_COARSE,
+        "units.electrophysiology.parameters.refine=1",
+        "units.active_stress.parameters.time_integration=exact",
+    )
+    package = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "built", *sets, fmi=3)
+    with zipfile.ZipFile(package) as archive:
+        texts = {name: archive.read(name) for name in archive.namelist() if name.endswith((".ssd", ".ssv"))}
+    roots = {name: etree.fromstring(text) for name, text in texts.items()}
+    assert len(roots) == 3
+    for name, root in roots.items():
+        kind = "Description" if name.endswith(".ssd") else "ParameterValues"
+        etree.XMLSchema(file=str(_SCHEMAS / f"SystemStructure{kind}.xsd")).assertValid(root)
+        assert root.get("version") == "2.0"
+    structure = roots["SystemStructure.ssd"]
+    ends = ("startElement", "startConnector", "endElement", "endConnector")
+    assert {tuple(map(each.get, ends)) for each in structure.iterfind(".//{*}Connection")} == {
+        ("mechanics", "stretch", "electrophysiology", "stretch"),
+        ("fibers", "fiber", "electrophysiology", "fiber"),
+        ("fibers", "fiber", "mechanics", "fiber"),
+        ("fibers", "sheet", "mechanics", "sheet"),
+        ("electrophysiology", "potential", "active_stress", "potential"),
+        ("active_stress", "active_stress", "mechanics", "active_stress"),
+    }
+    (fiber,) = structure.iterfind(".//{*}Component[@name='fibers']//{*}Connector[@name='fiber']")
+    assert [(etree.QName(each).localname, dict(each.attrib)) for each in fiber][:3] == [
+        ("Float64", {"unit": "1"}),
+        ("Dimension", {"size": "15"}),
+        ("Dimension", {"size": "3"}),
+    ]
+    given = {
+        (name, parameter.get("name")): (etree.QName(parameter[0]).localname, dict(parameter[0].attrib))
+        for name, root in roots.items()
+        for parameter in root.iterfind(".//{*}Parameter")
+    }
+    assert given == {
+        ("resources/electrophysiology.ssv", "time_scale_reduction"): ("Float64", {"value": "0.0", "unit": "1"}),
+        ("resources/electrophysiology.ssv", "stimulus_x_min_mm"): ("Float64", {"value": "-1.0", "unit": "mm"}),
+        ("resources/electrophysiology.ssv", "stimulus_x_max_mm"): ("Float64", {"value": "8.0", "unit": "mm"}),
+        ("resources/electrophysiology.ssv", "refine"): ("Int32", {"value": "1"}),
+        ("resources/active_stress.ssv", "time_integration"): ("String", {"value": "exact"}),
+    }
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_components_do_not_lie_on_each_other(fmi: int, cosim: Cosim, tmp_path: Path) -> None:
+    package = _package(cosim, _SCENARIOS / "strand.yaml", tmp_path / "built", *_COARSE, fmi=fmi)
+    with zipfile.ZipFile(package) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    boxes = {
+        part.get("name"): [float(part.find("{*}ElementGeometry").get(side)) for side in ("x1", "y1", "x2", "y2")]
+        for part in root.iterfind(".//{*}Component")
+    }
+    # One behind the other, in the order of execution, and on the canvas.
+    (canvas,) = root.iterfind(".//{*}SystemGeometry")
+    edges = [x for name in ("fibers", "electrophysiology", "active_stress", "mechanics") for x in boxes[name][::2]]
+    assert edges == sorted(edges)
+    assert float(canvas.get("x1")) < edges[0]
+    assert edges[-1] < float(canvas.get("x2"))
+    for connector in root.iterfind(".//{*}Connector"):
+        place = connector.find("{*}ConnectorGeometry")
+        assert place.get("x") == {"input": "0.0", "output": "1.0"}[connector.get("kind")]
+        assert 0.0 < float(place.get("y")) < 1.0
+    assert all(each.find("{*}ConnectionGeometry") is not None for each in root.iterfind(".//{*}Connection"))
 
 
 # --- FMPy -------------------------------------------------------------------------------------------------------------
@@ -202,7 +286,7 @@ def test_fmpy_and_the_lines_of_the_page_give_our_trajectory(
 def test_fmpy_alone_cannot_begin_a_heart(cosim: Cosim, tmp_path: Path) -> None:
     # If this fails, FMPy has learned to exchange initial values: then shorten the page.
     package = _package(cosim, _SCENARIOS / "cell.yaml", tmp_path, "run.stop_ms=30")
-    with pytest.raises(Exception, match="fmi2ExitInitializationMode failed with status 3"):
+    with pytest.raises(Exception, match="fmi2SetReal failed with status 3"):
         simulation.simulate_ssp(str(package), stop_time=0.03, step_size=0.001)
 
 
@@ -593,7 +677,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('version="1.0" name="two masses"', 'version="3.0" name="two masses"')],
             {},
-            ["SystemStructure.ssd, line 5", "version"],
+            ["SystemStructure.ssd: it is of SSP 3.0", "export it by SSP 1.0 or 2.0"],
         ),
         (
             [("<ssd:Connections>", "<ssd:Conections>"), ("</ssd:Connections>", "</ssd:Conections>")],

@@ -50,6 +50,12 @@ def compile_host(program: Path, *flags: str) -> Path:
     return program
 
 
+@pytest.fixture(scope="session")
+def headers() -> Path:
+    """The headers of both standards."""
+    return HEADERS
+
+
 @pytest.fixture
 def functions(fmi: int) -> list[str]:
     """The functions of the standard, for FMI 2 those of co-simulation, as its header declares them."""

@@ -1,6 +1,7 @@
 """If these fail, a host that makes and gives up many instances runs out of memory."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -43,16 +44,17 @@ def test_the_sanitizers_find_nothing_in_many_lives(run: Run, fmi: int) -> None:
 
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
-def test_valgrind_finds_nothing_lost_by_the_wrapper(
-    plain_host: Path, plain_library: Path, resources: Path, fmi: int
-) -> None:
+def test_valgrind_finds_nothing_lost_by_the_wrapper(plain_host: Path, resources: Path, fmi: int) -> None:
     options = ["--leak-check=full", "--show-leak-kinds=definite,indirect", "--error-exitcode=0", "--num-callers=40"]
-    command = ["valgrind", *options, str(plain_host), str(plain_library), str(fmi), str(resources), "silent"]
+    command = ["valgrind", *options, str(plain_host), str(wrapper.library()), str(fmi), str(resources), "silent"]
     environment = {"COSIM_PYTHON": sys.executable, "PYTHONMALLOC": "malloc", "PATH": os.environ["PATH"]}
     words = ["mute", "lives:200", "alive"]
     done = subprocess.run([*command, *words], capture_output=True, text=True, timeout=900, check=True, env=environment)
     assert _figures(done.stderr, "alive") == [1.0]
-    # Python keeps things to its end, which here does not come: what counts has the wrapper in its trace.
-    blocks = done.stderr.replace("\n\n", "\n").split("== \n")
-    ours = [block for block in blocks if "cosim_fmu" in block and ("lost" in block or "Invalid" in block)]
-    assert ours == []
+    # What Python makes once, for a module that load.py imports, it gives back at its end, which does
+    # not come here. What is lost in every other life is the wrapper's, and so is what it allocated itself.
+    lost = re.findall(r"in ([\d,]+) blocks are (?:definitely|indirectly) lost.*\n(?:.* at .*\n)(.*)\n", done.stderr)
+    assert [(count, frame) for count, frame in lost if int(count.replace(",", "")) >= 100 or "cosim_fmu" in frame] == []
+    # Python's integers read a digit of zero that has none, and what follows from it is told as well.
+    errors = re.findall(r"(?:Invalid|uninitialised).*\n(.* at .*)\n", done.stderr)
+    assert [frame for frame in errors if "cosim_fmu" in frame] == []

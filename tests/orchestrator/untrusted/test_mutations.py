@@ -232,13 +232,13 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A package of ours, whose FMUs have descriptions only."""
+@pytest.fixture(scope="module", params=[2, 3])
+def package(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A package of ours, of SSP 1.0 or 2.0, whose FMUs have descriptions only."""
     folder = tmp_path_factory.mktemp("package")
     path = next(path for path in _SCENARIOS if path.stem == "cell")
     scenario = load_scenario(path)
-    whole = write_package(build_fmus(scenario, path.parent, folder / "built"))
+    whole = write_package(build_fmus(scenario, path.parent, folder / "built", fmi=request.param))
     small: dict[str, bytes] = {}
     with zipfile.ZipFile(whole) as archive:
         for name in archive.namelist():

@@ -6,13 +6,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ..fmus.system import Component, Link, System
-from .assembly import called_directly, make_participants
-from .coupling.connections import Connection, connect
-from .errors import InputError
-from .participants.native import Mesh
-from .participants.participant import Participant, Ports
-from .scenario import Scenario
+from ..assembly import called_directly, make_participants
+from ..coupling.connections import Connection, connect
+from ..coupling.master import stepping_order
+from ..errors import InputError
+from ..participants.native import Mesh
+from ..participants.participant import Participant, Ports
+from ..scenario import Scenario
+from .system import Component, Link, System
 
 _MS_PER_S = 1000.0
 
@@ -23,27 +24,29 @@ MESH = "mesh.npz"
 def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[str, Path]) -> System:
     """The system of `scenario`, whose paths are relative to `base`; `built` are the FMUs of its units by their name.
 
-    Its connections are all that the scenario resolves to, those found by name included. InputError as for a run.
+    Its connections are all that the scenario resolves to, those found by name included. InputError as for a run, and
+    where elements of an array of FMI 3.0 are connected, which a system has no words for.
     """
     if scenario.inputs is not None:
         raise InputError("inputs: a system has no place for signals of a file; remove `inputs`")
     with ExitStack() as stack:
         participants = make_participants(stack, called_directly(scenario), base, mesh, described=True)
         connections = connect(participants, scenario.connections, scenario.connect_by_name)
+        order = stepping_order(participants, scenario.coupling.order)
     split = _split(participants, connections)
     components = []
     for name, entry in scenario.units.items():
         if entry.fmu is not None and (base / entry.fmu).is_dir():
             raise InputError(f"units.{name}.fmu: {entry.fmu} is a folder; pack it, for a system is made of files")
         ports = participants[name]
-        given: dict[str, Any] = {**entry.parameters, **entry.start}
         component = Component(
             name,
             built[entry.unit] if entry.unit is not None else base / str(entry.fmu),
             _shapes(ports.inputs, {array for unit, array in split["input"] if unit == name}),
             _shapes(ports.outputs, {array for unit, array in split["output"] if unit == name}),
-            given,
+            {**entry.parameters, **entry.start},
         )
+        _check_whole(component, {array for side in split.values() for unit, array in side if unit == name})
         components.append(component)
     links: list[Link] = []
     for link in connections:
@@ -55,7 +58,19 @@ def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[
             ends = [(one, other, ()) for one, other in zip(source.elements, target.elements, strict=True)]
         links += [Link(link.source.unit, one, link.target.unit, other, shape, law) for one, other, shape in ends]
     stop, step = scenario.run.stop_ms / _MS_PER_S, scenario.coupling.step_ms / _MS_PER_S
-    return System(scenario.name, tuple(components), tuple(links), stop, step)
+    first = [name for name in scenario.units if name not in order]
+    return System(scenario.name, tuple(components), tuple(links), stop, step, (*first, *order))
+
+
+def _check_whole(component: Component, split: Set[str]) -> None:
+    """InputError if an array that is to be connected by its elements is one variable of the FMU."""
+    for array in sorted(split & component.variables.keys()):
+        if component.variables[array].dimensions:
+            raise InputError(
+                f"connections: of the array {component.name}.{array} of FMI 3.0 single elements are connected, or it "
+                "is connected to one of another shape, which a system has no words for; connect whole arrays of one "
+                "shape, or take FMUs of FMI 2.0"
+            )
 
 
 def _split(

@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from .archive import put_in_place
-from .layout import scalar_names
+from ...fmus.archive import put_in_place
+from ...fmus.layout import scalar_names
 from .system import Component, System
 
 
@@ -19,10 +19,10 @@ def write_container(system: System, folder: Path) -> Path:
 
     Raises
     ------
-    InvalidInput
+    InputError
         If a link transforms its values.
     """
-    system.require_plain_links("fmu-manipulation-toolbox")
+    system.require_plain("fmu-manipulation-toolbox")
     # The tool knows an FMU by a file name: a second instance is given one of its own, and the file that it stands for.
     names = {component.name: _instance(system, component) for component in system.components}
     system.copy_fmus(folder)

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 from cardiac_cosim.fmus.build import build_fmu
-from cardiac_cosim.fmus.container import write_container
 from cardiac_cosim.fmus.layout import layout
-from cardiac_cosim.fmus.osp import write_osp
-from cardiac_cosim.fmus.ssp import write_ssp
-from cardiac_cosim.fmus.system import Component, Link, System
-from cardiac_cosim.units.errors import InvalidInput
+from cardiac_cosim.orchestrator.errors import InputError
+from cardiac_cosim.orchestrator.ssp.export import write_ssp
+from cardiac_cosim.orchestrator.systems.container import write_container
+from cardiac_cosim.orchestrator.systems.osp import write_osp
+from cardiac_cosim.orchestrator.systems.system import Component, Link, System
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.registry import UNITS
 from cardiac_cosim.units.variable import Causality
@@ -43,7 +43,7 @@ def heart(fmus: dict[str, Path], tiny: Mesh) -> System:
     parts = (
         component("fibers", "fiber_generator"),
         component("electro", "electrophysiology", stretch_conductance=0.1, refine=0),
-        component("stress", "active_stress", input_interpolation="linear"),
+        component("stress", "active_stress", time_integration="exact"),
         component("mechanics", "mechanics"),
         component("idle_stress", "active_stress"),
     )
@@ -96,14 +96,14 @@ def test_osp_gives_parameters_in_their_types(heart: System, tmp_path: Path) -> N
     assert given == {
         ("electro", "stretch_conductance"): ("Real", "0.1"),
         ("electro", "refine"): ("Integer", "0"),
-        ("stress", "input_interpolation"): ("String", "linear"),
+        ("stress", "time_integration"): ("String", "exact"),
     }
 
 
 def test_osp_cannot_tell_fmus_of_one_model_name_apart(heart: System, small_heart: Mesh, tmp_path: Path) -> None:
     other = build_fmu(UNITS["active_stress"], small_heart, tmp_path / "elsewhere" / "active_stress.fmu")
     parts = (*heart.components[:-1], replace(heart.components[-1], fmu=other))
-    with pytest.raises(InvalidInput, match="'stress' and 'idle_stress' are both called active_stress"):
+    with pytest.raises(InputError, match="'stress' and 'idle_stress' are both called active_stress"):
         write_osp(replace(heart, components=parts), tmp_path / "out")
 
 
@@ -140,7 +140,7 @@ def test_a_container_begins_its_loops_where_nothing_is_right(heart: System, tmp_
 @pytest.mark.parametrize("write", [write_osp, write_container])
 def test_what_cannot_transform_refuses_to(write: Any, heart: System, tmp_path: Path) -> None:
     links = (replace(heart.links[0], law=(2.0, 0.0)), *heart.links[1:])
-    with pytest.raises(InvalidInput, match=r"fibers\.fiber -> electro\.fiber transforms its values"):
+    with pytest.raises(InputError, match=r"fibers\.fiber -> electro\.fiber transforms its values"):
         write(replace(heart, links=links), tmp_path)
 
 
@@ -153,7 +153,7 @@ def test_what_cannot_transform_refuses_to(write: Any, heart: System, tmp_path: P
 def test_a_value_for_a_variable_that_is_not_there_is_refused(write: Any, heart: System, tmp_path: Path) -> None:
     wrong = replace(heart.components[1], given={"strech_conductance": 0.1})
     parts = (heart.components[0], wrong, *heart.components[2:])
-    with pytest.raises(InvalidInput, match=r"electrophysiology\.fmu of 'electro' has no variable 'strech_conductance'"):
+    with pytest.raises(InputError, match=r"electrophysiology\.fmu of 'electro' has no variable 'strech_conductance'"):
         write(replace(heart, components=parts), tmp_path)
 
 

@@ -11,9 +11,9 @@ from typing import Any
 from lxml import etree
 from lxml.builder import ElementMaker
 
-from ..units.errors import InvalidInput
-from .archive import put_in_place
-from .layout import scalar_names
+from ...fmus.archive import put_in_place
+from ...fmus.layout import scalar_names
+from ..errors import InputError
 from .system import Component, System, Value
 
 STRUCTURE = "OspSystemStructure.xml"
@@ -30,15 +30,15 @@ def write_osp(system: System, folder: Path) -> Path:
 
     Raises
     ------
-    InvalidInput
+    InputError
         If a link transforms its values, or two FMUs that differ have one model name, by which libcosim finds groups.
     """
-    system.require_plain_links("libcosim")
+    system.require_plain("libcosim")
     models: dict[str, Component] = {}
     for component in system.components:
         first = models.setdefault(component.description.modelName, component)
         if first.fmu != component.fmu:
-            raise InvalidInput(
+            raise InputError(
                 f"the FMUs of '{first.name}' and '{component.name}' are both called "
                 f"{component.description.modelName} (modelName), and libcosim tells FMUs apart by that"
             )
