@@ -23,7 +23,7 @@ from .annotations import TOOL
 from .coordinates import coordinates
 
 #: What an FMU imports beyond Python itself.
-PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio")
+PACKAGES = ("numpy", "scipy", "scikit-fem")
 
 _OWN = Path(__file__).parent
 _STRUCT = "org.fmi-standard.fmi-ls-struct"

@@ -6,12 +6,12 @@ from ...units.unit import Unit
 from ..layout import layout
 from .fmi3 import start_list
 
-#: Scalars of FMI 2.0, in some 200 MB of text. FMPy takes 4 GB of memory to read them; of ten times as many the text
-#: would not fit into an archive without ZIP64, which FMI forbids (section 2.3: version 2.0 is needed to extract).
+#: Scalars of FMI 2.0, in some 220 MB of text: FMPy takes 3.4 GB of memory and half a minute to read them. Twenty times
+#: as many would not fit into an archive without ZIP64, which FMI forbids (section 2.3, version needed to extract).
 MOST_SCALARS = 1_000_000
 
 #: Characters of an attribute, libxml2's limit unless a reader lifts it.
-_LONGEST_ATTRIBUTE = 10_000_000
+LONGEST_ATTRIBUTE = 10_000_000
 
 
 def check_size(unit: type[Unit], mesh: Mesh, fmi: int) -> None:
@@ -28,9 +28,9 @@ def check_size(unit: type[Unit], mesh: Mesh, fmi: int) -> None:
             )
         return
     for run in runs:
-        if run.variable.stand_in and len(start_list(run)) > _LONGEST_ATTRIBUTE:
+        if run.variable.stand_in and len(start_list(run)) > LONGEST_ATTRIBUTE:
             raise InvalidInput(
                 f"the start values of the input '{run.variable.name}' of unit '{unit.name}' on {mesh.elements} "
-                f"elements are more than {_LONGEST_ATTRIBUTE} characters, which readers of XML refuse; exchange the "
+                f"elements are more than {LONGEST_ATTRIBUTE} characters, which readers of XML refuse; exchange the "
                 "fields on a coarser mesh (scene.mesh_size_mm), and refine it inside the units (parameter `refine`)"
             )
