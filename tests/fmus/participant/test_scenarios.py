@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cardiac_cosim.cli import app as cli
-from cardiac_cosim.orchestrator.errors import ParticipantError, RunError
+from cardiac_cosim.orchestrator.errors import InputError, ParticipantError, RunError
 from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
@@ -93,3 +93,13 @@ def test_what_cosim_build_makes_takes_a_units_place(fmi: int, tmp_path: Path) ->
     assert (tmp_path / "fmus" / "timeseries.csv").read_text().count("\n") == 12
     heart, fmus = (np.genfromtxt(tmp_path / name / "timeseries.csv", delimiter=",") for name in ("heart", "fmus"))
     np.testing.assert_array_equal(heart[1:], fmus[1:])
+
+
+def test_files_for_libcosim_and_containers_are_of_fmi_2_only(tmp_path: Path) -> None:
+    (tmp_path / "heart.yaml").write_text(_HEART)
+    for option in ("--osp", "--container"):
+        arguments = ["build", str(tmp_path / "heart.yaml"), "--fmi", "3", option, "--output", str(tmp_path / "out")]
+        result = CliRunner().invoke(cli.app, arguments)
+        assert isinstance(result.exception, InputError)
+        assert "are for FMUs of FMI 2.0" in str(result.exception)
+    assert not (tmp_path / "out").exists()
