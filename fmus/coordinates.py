@@ -15,7 +15,7 @@ from ..units.unit import Unit
 from ..units.variable import Causality, Location, Variable
 from .layout import Run, layout
 
-_MOST_PLACES = 100_000
+MOST_PLACES = 100_000
 _DECIMALS = 6
 _WHAT = {Location.NODE: "nodes", Location.ELEMENT: "elements' centroids"}
 
@@ -35,7 +35,7 @@ def coordinates(unit: type[Unit], mesh: Mesh) -> tuple[Coordinates, ...]:
         if all(run.variable.location is not location for run in runs):
             continue
         points = mesh.points if location is Location.NODE else mesh.points[mesh.cells].mean(axis=1)
-        if len(points) > _MOST_PLACES:
+        if len(points) > MOST_PLACES:
             continue
         # Without zeros of either sign.
         for axis, values in zip("xyz", (np.round(points, _DECIMALS) + 0.0).T, strict=True):

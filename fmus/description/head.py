@@ -47,5 +47,8 @@ def _capabilities(unit: type[Unit], fmi: int) -> dict[str, str]:
         able.append("canNotUseMemoryManagementFunctions")
     if unit.interpolates:
         able.append("canInterpolateInputs" if fmi == 2 else "providesIntermediateUpdate")
+    if unit.differentiable:
+        both = ["providesDirectionalDerivatives", "providesAdjointDerivatives"]
+        able += ["providesDirectionalDerivative"] if fmi == 2 else both
     unable = ("needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess")
     return dict.fromkeys(unable, "false") | dict.fromkeys(able, "true")

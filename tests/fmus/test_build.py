@@ -19,8 +19,6 @@ from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.registry import UNITS
 
 _UNIT = UNITS["active_stress"]
-#: What makes another process build FMUs with the same binary.
-_WITH = {"own": "", "pythonfmu": "from cardiac_cosim.fmus import wrapper\nwrapper.library = lambda: None\n"}
 
 
 def _changed(mesh: Mesh, points: np.ndarray | None = None, **boundaries: np.ndarray) -> Mesh:
@@ -39,14 +37,12 @@ def _other_code(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("unit", UNITS)
-def test_the_same_content_makes_the_same_bytes(unit: str, tiny: Mesh, fmus: dict, tmp_path: Path) -> None:
-    again = build.build_fmu(UNITS[unit], tiny, tmp_path / "another name.fmu")
-    assert again.read_bytes() == fmus[unit].read_bytes()
+def test_the_same_content_makes_the_same_bytes(unit: str, fmi: int, tiny: Mesh, packed: dict, tmp_path: Path) -> None:
+    again = build.build_fmu(UNITS[unit], tiny, tmp_path / "another name.fmu", fmi)
+    assert again.read_bytes() == packed[unit].read_bytes()
 
 
-def test_another_process_makes_the_same_bytes(
-    fmus: dict, binary: str, outside: Callable[..., str], tmp_path: Path
-) -> None:
+def test_another_process_makes_the_same_bytes(fmus: dict, outside: Callable[..., str], tmp_path: Path) -> None:
     with zipfile.ZipFile(fmus["mechanics"]) as archive:
         archive.extract("resources/mesh.npz", tmp_path)
     text = """
@@ -57,7 +53,7 @@ from cardiac_cosim.units.mesh.archive import unpack_mesh
 from cardiac_cosim.units.registry import UNITS
 build_fmu(UNITS["mechanics"], unpack_mesh(Path(sys.argv[1])), Path(sys.argv[2]))
 """
-    outside(_WITH[binary] + text, tmp_path / "resources" / "mesh.npz", tmp_path / "again.fmu", block=False)
+    outside(text, tmp_path / "resources" / "mesh.npz", tmp_path / "again.fmu", block=False)
     assert (tmp_path / "again.fmu").read_bytes() == fmus["mechanics"].read_bytes()
 
 
@@ -184,7 +180,7 @@ def test_a_build_inside_a_build(tiny: Mesh, tmp_path: Path, monkeypatch: pytest.
     assert [path.name for path in tmp_path.iterdir()] == ["same.fmu"]
 
 
-def test_two_processes_build_the_same_fmu(fmus: dict, binary: str, tmp_path: Path) -> None:
+def test_two_processes_build_the_same_fmu(fmus: dict, tmp_path: Path) -> None:
     with zipfile.ZipFile(fmus["active_stress"]) as archive:
         archive.extract("resources/mesh.npz", tmp_path / "mesh")
     text = """
@@ -201,7 +197,7 @@ for _ in range(6):
     command = [
         sys.executable,
         "-c",
-        _WITH[binary] + text,
+        text,
         str(tmp_path / "mesh" / "resources" / "mesh.npz"),
         str(destination),
     ]
@@ -228,7 +224,6 @@ def test_a_build_that_fails_leaves_the_old_file(tiny: Mesh, tmp_path: Path, monk
 def test_two_versions_in_one_process_run_their_own_code(
     tiny: Mesh,
     fmus: dict,
-    binary: str,
     cases: dict,
     drive: Callable[..., Any],
     tmp_path: Path,
@@ -244,16 +239,13 @@ def test_two_versions_in_one_process_run_their_own_code(
         for driver, factor in zip(drivers, (1.0, 2.0), strict=True):
             assert driver.step(time, size, inputs) == 0
             np.testing.assert_array_equal(driver.get("active_stress"), factor * expected["active_stress"])
-    packages, stubs = [], []
+    packages = []
     for path in (fmus["active_stress"], other):
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
-            if binary == "pythonfmu":
-                stubs.append(archive.read("resources/slavemodule.txt").decode())
         packages.extend({name.split("/")[1] for name in names if name.startswith("resources/cosim_")})
     assert len(set(packages)) == 2
-    assert len(set(stubs)) == len(stubs)
-    assert {*packages, *stubs} <= set(sys.modules)
+    assert set(packages) <= set(sys.modules)
     assert drivers[0].description.guid != drivers[1].description.guid
 
 
@@ -275,7 +267,7 @@ for name, unit in UNITS.items():
     build_fmu(unit, mesh, Path(sys.argv[2]) / f"{name}.fmu")
 assert sys.path == path, sys.path
 left = sorted(set(sys.modules) - modules)
-assert not [name for name in left if name.startswith("cosim_") or name.split("_")[0] in str(list(UNITS))], left
+assert not [name for name in left if name.startswith("cosim_") or name in UNITS], left
 stray = [name for name, module in sys.modules.items() if "cosim-build-" in str(getattr(module, "__file__", ""))]
 assert not stray, stray
 print("clean")
@@ -320,7 +312,7 @@ def test_kernels_that_were_compiled_are_carried_and_make_another_fmu(
     monkeypatch.setattr(build.registry, "__file__", str(floor / "registry.py"))
 
     # Each time as another process reads the code.
-    monkeypatch.setattr(build, "_read", build._read.__wrapped__)
+    monkeypatch.setattr(build, "sources", build.sources.__wrapped__)
     before = build.fingerprint(_UNIT, tiny)
     (floor / "mechanics" / "kernels.abi3.so").write_bytes(b"\x7fELF 1")
     one = build.fingerprint(_UNIT, tiny)

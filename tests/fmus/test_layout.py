@@ -38,6 +38,6 @@ def test_a_field_of_vectors_and_a_scalar(tiny: Mesh) -> None:
 @pytest.mark.parametrize("unit", UNITS)
 def test_the_description_lists_the_scalars_as_laid_out(unit: str, tiny: Mesh, fmus: dict) -> None:
     variables = read_model_description(str(fmus[unit]), validate=False).modelVariables
-    laid_out = [(name, run.fmi_type) for run in layout(UNITS[unit], tiny) for name in run.names()]
+    laid_out = [(name, run.type_in(2)) for run in layout(UNITS[unit], tiny) for name in run.names()]
     assert [(variable.name, variable.type) for variable in variables] == laid_out
     assert [variable.valueReference for variable in variables] == list(range(len(laid_out)))
