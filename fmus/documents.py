@@ -103,7 +103,7 @@ def _row(item: Variable, mesh: Mesh) -> dict[str, str]:
     if item.causality in (Causality.INPUT, Causality.OUTPUT):
         row["values"] = shape(item, f"{mesh.nodes} nodes", f"{mesh.elements} elements")
     if item.causality in (Causality.INPUT, Causality.PARAMETER):
-        row |= {"start": " ".join(map(str, item.stand_in or (item.start,))), "limits": limits(item)}
+        row |= {"start": str(item.start), "limits": limits(item)}
     return row | {"description": item.description + (notes(item) if "values" in row else "")}
 
 

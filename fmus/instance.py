@@ -268,10 +268,9 @@ class UnitInstance:
     def _check_input(self, piece: Piece, values: np.ndarray) -> None:
         variable = piece.run.variable
         self.unit.check_values(variable, values, piece.places)
-        if variable.fixed and self.unit.phase is Phase.STEPPING and piece.places is not None:
-            # In one piece the unit looks itself.
-            own = self._current(variable.name).ravel()[piece.places]
-            if not np.array_equal(own, values):
+        if variable.fixed and self.unit.phase is Phase.STEPPING:
+            own = self._current(variable.name).ravel()
+            if not np.array_equal(own if piece.places is None else own[piece.places], values):
                 raise InvalidInput(f"input '{variable.name}' of unit '{self.unit.name}' is fixed after initialisation")
 
     def _take(self, piece: Piece, values: np.ndarray) -> None:

@@ -68,7 +68,7 @@ def bodies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "holding": build_body.build_body(folder / "holding.fmu", ramps=False),
     } | {
         quirk.lower(): build_body.build_body(folder / f"{quirk.lower()}.fmu", quirk=quirk)
-        for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES", "LEAVES", "BREAKS")
+        for quirk in ("COMMITS", "RESETS", "ENDS", "DIES", "REASONS", "LINES", "LEAVES", "BREAKS", "TELLS")
     }
 
 

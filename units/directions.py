@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import FloatArray, frozen
 from .errors import InvalidInput
 from .variable import Causality, Location, Variable
+
+#: A unit vector's components where they are alike: one number is then what a whole field starts with, in FMI as well.
+_ALIKE = 3.0**-0.5
 
 FIBER_INPUT = Variable(
     "fiber",
@@ -14,7 +17,8 @@ FIBER_INPUT = Variable(
     Location.ELEMENT,
     components=3,
     fixed=True,
-    stand_in=(1.0, 0.0, 0.0),
+    start=_ALIKE,
+    stand_in=True,
 )
 SHEET_INPUT = Variable(
     "sheet",
@@ -24,11 +28,20 @@ SHEET_INPUT = Variable(
     Location.ELEMENT,
     components=3,
     fixed=True,
-    stand_in=(0.0, 1.0, 0.0),
+    start=_ALIKE,
+    stand_in=True,
 )
 
 #: Deviation from a unit vector, or from a right angle, that is taken for rounding in another tool.
 _TOLERANCE = 1e-6
+
+
+def given_sheet(sheet: FloatArray, fiber: FloatArray) -> FloatArray:
+    """`sheet`, shape (elements, 3); as long as nobody has given it, directions normal to the unit vectors `fiber`."""
+    if not (sheet == SHEET_INPUT.start).all():
+        return sheet
+    normal = np.cross(fiber, np.eye(3)[np.abs(fiber).argmin(axis=1)])
+    return frozen(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 def check_directions(name: str, directions: FloatArray, normal_to: FloatArray | None = None) -> None:

@@ -466,7 +466,7 @@ class Unit(ABC):
             )
 
     def _default(self, variable: Variable) -> FloatArray:
-        return frozen(np.full(variable.shape(self.mesh), variable.stand_in or variable.start))
+        return frozen(np.full(variable.shape(self.mesh), variable.start))
 
     def _field(self, variable: Variable, value: ArrayLike | str) -> FloatArray:
         array = checked_field(variable, value, self.mesh, self.name)

@@ -63,7 +63,7 @@ class Variable:
     `unit` is the unit of measure ("mV"; "1" for a pure number). `depends_on` names the inputs that an output follows;
     `pointwise` says that its value at a place follows those inputs at this place only. `fixed` variables keep their
     value after initialisation. `needs` names a parameter that must differ from zero for the input or output to matter.
-    `stand_in`, by component, is what an input starts with that has no sensible value, until somebody gives one.
+    What an input starts with is a `stand_in` where only another unit knows its value: it lets the unit run by itself.
     `missing` is the value at places that have none yet; `mean_record` says of a field what `record` says of its mean.
     `refines` says of a number that it decides the unit's numerical error, and how; it needs a lower limit.
     """
@@ -76,7 +76,7 @@ class Variable:
     components: int = 1
     start: Scalar = 0.0
     fixed: bool = False
-    stand_in: tuple[float, ...] = ()
+    stand_in: bool = False
     depends_on: tuple[str, ...] = ()
     pointwise: bool = False
     needs: str | None = None

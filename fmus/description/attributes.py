@@ -30,9 +30,9 @@ def measure(run: Run, fmi: int) -> dict[str, str]:
     return found if variable.at_least is None else found | {"min": number(variable.at_least)}
 
 
-def starts(variable: Variable) -> list[str]:
-    """Start values of the components, or the one of all of them."""
-    return [str(value) if isinstance(value, str) else number(value) for value in variable.stand_in or (variable.start,)]
+def start(variable: Variable) -> str:
+    """The start value, of a field that of all its places."""
+    return variable.start if isinstance(variable.start, str) else number(variable.start)
 
 
 def number(value: float) -> str:

@@ -18,7 +18,7 @@ from ...units.variable import Causality, Location
 from ..annotations import TOOL, annotations
 from ..layout import Run, layout
 from ..xml_tag import tag
-from .attributes import is_unknown, measure, role, starts
+from .attributes import is_unknown, measure, role, start
 from .head import head
 
 
@@ -57,11 +57,10 @@ def _index(run: Run, place: int = 0) -> int:
 def _scalars(run: Run) -> Iterator[str]:
     variable = run.variable
     own = tag("ScalarVariable", **role(variable), description=variable.description, end=False)
-    own = own.removeprefix("<ScalarVariable")
-    values = [{}] if is_unknown(run) else [{"start": start} for start in starts(variable)]
-    ends = [f"{own}{tag(run.type_in(2), end=True, **start, **measure(run, 2))}</ScalarVariable>" for start in values]
+    given = {} if is_unknown(run) else {"start": start(variable)}
+    rest = own.removeprefix("<ScalarVariable") + tag(run.type_in(2), end=True, **given, **measure(run, 2))
     for place, name in enumerate(run.names()):
-        yield f'<ScalarVariable name="{name}" valueReference="{run.first + place}"{ends[place % len(ends)]}'
+        yield f'<ScalarVariable name="{name}" valueReference="{run.first + place}"{rest}</ScalarVariable>'
 
 
 def _outputs(runs: tuple[Run, ...], mesh: Mesh) -> Iterator[str]:

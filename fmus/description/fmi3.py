@@ -1,7 +1,7 @@
 """The modelDescription.xml of a unit's FMI 3.0 FMU, from the unit's own declaration (FMI 3.0, section 2.4).
 
-A field is one Float64 variable with fixed dimensions: only directions, whose start values differ between components,
-and the coordinates of places make the text longer on a larger mesh.
+A field is one Float64 variable with fixed dimensions and one start value for all of its places: only the coordinates
+of places make the text longer on a larger mesh.
 
 What depends on what. As in the FMI 2.0 description, `dependencies` names for each output the inputs that a step
 carries over to it, and the parameters, which FMI 3.0 counts among what is known; the list is absent where an output
@@ -18,7 +18,7 @@ from ..annotations import TOOL, annotations
 from ..coordinates import Coordinates, coordinates
 from ..layout import TIME, Run, layout
 from ..xml_tag import tag
-from .attributes import is_unknown, measure, number, role, starts
+from .attributes import is_unknown, measure, number, role, start
 from .head import head
 
 
@@ -45,12 +45,6 @@ def lines(unit: type[Unit], mesh: Mesh, token: str) -> Iterator[str]:
     yield "</fmiModelDescription>"
 
 
-def start_list(run: Run) -> str:
-    """The start values of an array: one for all of its elements, or each one's."""
-    values = starts(run.variable)
-    return " ".join(values * (run.size // len(values))) if len(values) > 1 else values[0]
-
-
 def _element(run: Run, attributes: dict[str, str], nested: str = "") -> str:
     named = {"name": run.variable.name, "valueReference": str(run.reference), **attributes}
     described = {"description": run.variable.description, **measure(run, 3)}
@@ -65,8 +59,8 @@ def _variable(run: Run, unit: type[Unit]) -> str:
     if is_unknown(run):
         return _element(run, attributes)
     if run.type_in(3) == "String":
-        return _element(run, attributes, tag("Start", value=str(run.variable.start), end=True))
-    return _element(run, attributes | {"start": start_list(run)})
+        return _element(run, attributes, tag("Start", value=start(run.variable), end=True))
+    return _element(run, attributes | {"start": start(run.variable)})
 
 
 def _constant(known: Coordinates) -> str:

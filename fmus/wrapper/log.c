@@ -18,8 +18,8 @@ static unsigned bit_of(const char *category) {
     return 0;
 }
 
-/* Reasons of failures are told even to a host that asked for no log: without them it would have a number only. One that
- * has chosen its categories gets those. */
+/* Reasons of failures are told even to a host of FMI 2 that asked for no log: without them it would have a number only.
+ * One that has chosen its categories gets those. */
 static int wanted(const Log *log, Status status, const char *category) {
     if (log->logger == NULL) return 0;
     return (log->enabled & bit_of(category)) != 0 || (status >= DISCARD && !log->chosen);

@@ -194,7 +194,7 @@ def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Po
             variable.record.value,
             variable.needs,
             variable.source.name if isinstance(variable, Statistic) else None,
-            stand_in=bool(variable.stand_in),
+            stand_in=variable.stand_in,
         )
 
     inputs = Ports({item.name: port(item) for item in kind.inputs()})

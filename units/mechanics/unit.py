@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix
 from .. import kernels
 from ..arrays import FloatArray, IntArray, frozen
 from ..differentiable import Differentiable
-from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions
+from ..directions import FIBER_INPUT, SHEET_INPUT, check_directions, given_sheet
 from ..errors import InvalidInput, StepFailure
 from ..mesh import Mesh
 from ..mesh.cavity import cavity_faces
@@ -141,8 +141,9 @@ class Mechanics(Differentiable):
         mesh = self.mesh
         if mesh.dimension != 3:
             raise InvalidInput("finite-element mechanics needs tetrahedra; take the unit local_mechanics in this scene")
-        fiber, sheet = self._inputs["fiber"], self._inputs["sheet"]
+        fiber = self._inputs["fiber"]
         check_directions("fiber", fiber)
+        sheet = given_sheet(self._inputs["sheet"], fiber)
         check_directions("sheet", sheet, normal_to=fiber)
         space = self.parameters(Elements).space(mesh)
         laws = [self.parameters(law) for law in self.parameters(Material).laws]

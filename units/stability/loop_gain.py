@@ -172,7 +172,7 @@ def _directions(coupled: Coupled, mesh: Mesh) -> dict[str, FloatArray]:
     if generators:
         generator = started(FiberGenerator, mesh, generators[0].parameters, {})
         return {name: generator.get(name) for name in names}
-    return {name: np.tile(np.asarray(Mechanics.variable(name).stand_in), (mesh.elements, 1)) for name in names}
+    return {name: np.tile(axis, (mesh.elements, 1)) for name, axis in zip(names, np.eye(3), strict=False)}
 
 
 def _changing(kind: type[Unit]) -> set[str]:

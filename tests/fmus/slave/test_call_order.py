@@ -27,15 +27,9 @@ _BOTH = """
     set a debug log          x x x x x
     enter initialization     x - - - -
     exit initialization      - x - - -
-    step                     - - x + -     discarded: it may be tried again, with other inputs or another size
     terminate                - - x x -
     reset                    x x x x x
     get an output            w x x x x
-    get an input             + + x x x
-    get a parameter          + + x x x
-    get a choice             + + x x x
-    get what it computes     + + x x x     before the initialization is over: an empty text
-    set an input             + x x + -     instantiated: as FMI 3.0 has it, in FMI 2.0 too; discarded: as step
     set a parameter          x x - - -
     set a choice             x x - - -
     set an output            - - - - -
@@ -50,6 +44,12 @@ _TABLES = {
     2: _BOTH
     + """
     set up the experiment    x - - - -
+    step                     - - x + -     discarded: it may be tried again, with other inputs or another size
+    set an input             + x x + -     instantiated: as in FMI 3.0; discarded: as step
+    get an input             + + x x x     what it starts with, or was set to, as in FMI 3.0
+    get a parameter          + + x x x
+    get a choice             + + x x x
+    get what it computes     + x x x x     before the initialization is over: an empty text
     set input derivatives    x x x + -     discarded: as step
     input derivatives of 2   - - - - -
     output derivatives       - - - - -     maxOutputDerivativeOrder is 0
@@ -61,8 +61,14 @@ _TABLES = {
 """,
     3: _BOTH
     + """
+    step                     - - x x -     discarded: the instance is as before the step, and may go on
+    set an input             x x x x -
+    get an input             x x x x x
+    get a parameter          x x x x x
+    get a choice             x x x x x
+    get what it computes     + x x x x     before the initialization is over: an empty text
     adjoint derivatives      - x x x x
-    get the time             x x x x x
+    get the time             + x x x x     instantiated: 0
     set the time             - - - - -
     enter event mode         - - - - -     hasEventMode is false
     enter step mode          - - - - -

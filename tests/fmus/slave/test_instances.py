@@ -167,9 +167,12 @@ def test_damaged_resources_are_told(unpacked: Any) -> None:
         assert message in unpacked.errors()
 
 
-def test_failures_are_told_to_hosts_that_asked_for_no_log(make: Make) -> None:
+def test_failures_are_told_to_hosts_that_asked_for_no_log_as_far_as_they_may_be(make: Make) -> None:
     driver = make("active_stress", logging=False)
     assert np.isnan(driver.read(driver.kinds[float], [10**6], 1)[0])
+    if driver.fmi == 3:
+        assert driver.messages == []
+        return
     ((status, _, text),) = driver.messages
     assert (status, text) == (3, "unit 'active_stress' has no value reference 1000000")
 

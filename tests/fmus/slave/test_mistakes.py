@@ -234,3 +234,25 @@ def test_a_fixed_input_cannot_be_changed_later(cases: dict, make: Make) -> None:
         _told(driver, "'fiber' of unit 'mechanics' is fixed after initialisation")
     assert driver.get("fiber") == case.fixed["fiber"].ravel().tolist()
     case.run(driver, first=1)
+
+
+def test_of_a_call_that_is_refused_nothing_is_taken(cases: dict, make: Make) -> None:
+    case = cases["mechanics"]
+    driver = make("mechanics")
+    driver.start(case.parameters, case.first())
+    assert driver.step(*case.steps[0], case.inputs[0]) == 0
+    before = driver.packed()
+    names = ["active_stress", "fiber", "lv_pressure"]
+    values = [np.zeros(driver.size("active_stress")), np.roll(case.fixed["fiber"], 1, axis=1).ravel(), [3.0]]
+    references = [reference for name in names for reference in driver.references(name)]
+    assert driver.write(driver.kinds[float], references, np.concatenate(values).tolist()) == 3
+    _told(driver, "'fiber' of unit 'mechanics' is fixed after initialisation")
+    assert driver.packed() == before
+    # Neither of parameters of which one is wrong.
+    driver.reset()
+    before = driver.packed()
+    names = ["shear_modulus_MPa", "fiber_exponent", "lv_pressure"]
+    references = [reference for name in names for reference in driver.references(name)]
+    assert driver.write(driver.kinds[float], references, [0.5, -1.0, 2.0]) == 3
+    _told(driver, "'fiber_exponent' is -1.0")
+    assert driver.packed() == before

@@ -37,13 +37,14 @@ def test_ecos_couples_the_strand_as_we_do(workshop: Any, strand: Any) -> None:
 
 
 def test_ecos_does_not_tell_of_failures(workshop: Any) -> None:
-    # The page warns of it. Without fibres there is no initial state: our FMU returns an error, and NaN from then on.
+    # The page warns of it. A substep that is too long ends the initialization: an error, and NaN from then on.
     text = """
 from ecospy import EcosSimulation, EcosSimulationStructure
 structure = EcosSimulationStructure()
 structure.add_model("unit", "cell/electrophysiology.fmu")
+structure.add_parameter_set("long", {"unit::longest_substep_ms": 5.0})
 with EcosSimulation(step_size=1e-3, structure=structure) as simulation:
-    print(simulation.init(), simulation.step(), simulation.get_real("unit::potential[1]"))
+    print(simulation.init(parameter_set="long"), simulation.step(), simulation.get_real("unit::potential[1]"))
 """
     assert workshop.run([sys.executable, "-c", text]) == "True 0.001 nan\n"
 

@@ -114,19 +114,21 @@ def test_a_status_is_the_slaves_own_and_its_reason_is_told(run: Run, fmi: int) -
     real = _real(fmi)
     done = run(fmi, "new", *(f"set:{real}:{reference}:0" for reference in (95, 96, 97, 98, 99, 100, 101)), "free")
     me = "two" if fmi == 2 else "env"
-    assert done.lines[1:] == [
-        # A warning is no failure, and this host asked for no log.
+    # A warning is no failure: the host of FMI 2 asked for no log, that of FMI 3 did.
+    lines = [line for line in done.lines[1:] if line != "log 1 logStatusWarning env: 95 is odd"]
+    assert len(lines) == len(done.lines) - fmi + 1
+    assert lines == [
         "set 1",
         f"log 2 logStatusError {me}: not now",
         "set 2",
-        f"log 3 logStatusError {me}: " + done.lines[4].partition(": ")[2],
+        f"log 3 logStatusError {me}: " + lines[3].partition(": ")[2],
         "set 3",
         f"log 3 logStatusError {me}: the slave has a defect",
         "set 3",
         # A number sign is doubled, as it marks value references; a percent sign arrives through printf.
         f"log 3 invalidInput {me}: 100% of ##99 is wrong",
         "set 3",
-        f"log 3 logStatusError {me}: " + done.lines[10].partition(": ")[2],
+        f"log 3 logStatusError {me}: " + lines[9].partition(": ")[2],
         "set 3",
         "set 3",
     ]

@@ -15,7 +15,7 @@ from cardiac_cosim.fmus import wrapper
 Run = Callable[..., Any]
 
 _HERE = Path(__file__).parent
-_LIVES = 10_000 // 2
+_LIVES = 10_000
 
 
 def _figures(text: str, name: str) -> list[float]:
@@ -33,7 +33,7 @@ def test_nothing_is_left_after_10_000_lives(plain_host: Path, resources: Path, f
     assert _figures(done.stderr, "alive") == [1.0]
     warm, end = _figures(done.stderr, "memory")
     assert warm > 0
-    # What the first half takes serves the second. A pointer lost in every life would be 80 kB, and an instance 1 MB.
+    # What the first ones take serves the others. A pointer lost in every life would be 80 kB, and an instance 1 MB.
     assert end - warm < 64, f"{end - warm} kB in {_LIVES} lives"
 
 

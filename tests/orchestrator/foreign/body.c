@@ -13,12 +13,15 @@
 #define LINES 6     /* takes first derivatives of inputs only */
 #define LEAVES 7    /* ends the process from 50 ms on as if all were done: exit(0) */
 #define BREAKS 8    /* writes where nobody may from 50 ms on */
+#define TELLS 9     /* writes the calls that it gets to the file that the environment variable JOURNAL names */
 #ifndef QUIRK
 #define QUIRK 0
 #endif
 /* The variables, by value reference: 0 m, 1 k, 2 c, 3 k_c, 4 c_c; 5 F, 6 x_in, 7 v_in; 8 x, 9 v; 10 force. */
 #include "fmi2Functions.h"
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -38,7 +41,20 @@ typedef struct {
     char name[64];
 } Body;
 
+static void tell(fmi2Component c, const char *format, ...) {
+    FILE *journal = QUIRK == TELLS && getenv("JOURNAL") ? fopen(getenv("JOURNAL"), "a") : NULL;
+    if (journal == NULL) return;
+    va_list arguments;
+    va_start(arguments, format);
+    fprintf(journal, "%s ", ((Body *)c)->name);
+    vfprintf(journal, format, arguments);
+    fputc('\n', journal);
+    va_end(arguments);
+    fclose(journal);
+}
+
 static fmi2Status fail(Body *body, const char *message) {
+    tell(body, "fails");
     body->callbacks.logger(body->callbacks.componentEnvironment, body->name, fmi2Error, "logStatusError", "%s", message);
     return fmi2Error;
 }
@@ -97,22 +113,33 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     return body;
 }
 
-void fmi2FreeInstance(fmi2Component c) { free(c); }
+void fmi2FreeInstance(fmi2Component c) {
+    tell(c, "FreeInstance");
+    free(c);
+}
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String k[]) { return fmi2OK; }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean t, fmi2Real tol, fmi2Real b, fmi2Boolean s, fmi2Real e) {
+    tell(c, "SetupExperiment");
     if (QUIRK == RESETS) {
         memset(&((Body *)c)->state, 0, sizeof(State));
         ((Body *)c)->state.values[M] = 1.0;
     }
     return fmi2OK;
 }
-fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    tell(c, "EnterInitializationMode");
+    return fmi2OK;
+}
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    tell(c, "ExitInitializationMode");
     update_force(&((Body *)c)->state);
     ((Body *)c)->committed = ((Body *)c)->state;
     return fmi2OK;
 }
-fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) {
+    tell(c, "Terminate");
+    return fmi2OK;
+}
 fmi2Status fmi2Reset(fmi2Component c) { return fmi2OK; }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
@@ -125,6 +152,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     State *s = &((Body *)c)->state;
     for (size_t i = 0; i < n; i++) {
+        tell(c, "SetReal %u", vr[i]);
         if (vr[i] >= FORCE) return fail(c, "no Real that can be set");
         if (vr[i] == M && value[i] <= 0.0) return fail(c, "the mass has to be above zero, 100 % of it");
         s->values[vr[i]] = value[i];
@@ -147,6 +175,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no_undo) {
     State *s = &((Body *)c)->state;
+    tell(c, "DoStep %.17g %.17g", time, h);
     if (QUIRK == COMMITS) {
         memcpy(((Body *)c)->committed.values + FIRST_INPUT, s->values + FIRST_INPUT, INPUTS * sizeof(double));
         if (no_undo) ((Body *)c)->committed = *s;

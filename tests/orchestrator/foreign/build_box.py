@@ -71,14 +71,15 @@ def _variable(name: str, kind: str, causality: str, reference: int, outer: str =
     )
 
 
-def build_box3(path: Path, variables: str, early: bool = False) -> Path:
+def build_box3(path: Path, variables: str, early: bool = False, updates: bool = False) -> Path:
     """Write an FMU of FMI 3.0 that declares `variables`, the content of ModelVariables, to `path`."""
+    ability = 'providesIntermediateUpdate="true"' if updates else ""
     text = (
         '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="3.0" modelName="box" '
-        'instantiationToken="box"><CoSimulation modelIdentifier="box" canHandleVariableCommunicationStepSize="true"/>'
-        f"<ModelVariables>{variables}</ModelVariables><ModelStructure/></fmiModelDescription>"
+        'instantiationToken="box"><CoSimulation modelIdentifier="box" canHandleVariableCommunicationStepSize="true" '
+        f"{ability}/><ModelVariables>{variables}</ModelVariables><ModelStructure/></fmiModelDescription>"
     )
-    binary = library("box3.c", f"-DEARLY={int(early)}")
+    binary = library("box3.c", f"-DEARLY={int(early)}", f"-DUPDATES={int(updates)}")
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
         archive.write(binary, f"binaries/{fmpy.platform_tuple}/{binary.name}")

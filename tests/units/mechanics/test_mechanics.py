@@ -488,4 +488,4 @@ def test_sheet_that_is_not_normal_to_the_fibre_is_refused(chambers, started) -> 
     with pytest.raises(InvalidInput, match="'sheet' is not normal to the fibre in element 7"):
         started(Mechanics, mesh, fiber=directions["fiber"], sheet=tilted)
     with pytest.raises(InvalidInput, match="'fiber' is no unit vector"):
-        started(Mechanics, mesh)
+        started(Mechanics, mesh, fiber=1.01 * directions["fiber"], sheet=directions["sheet"])

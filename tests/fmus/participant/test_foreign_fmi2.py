@@ -1,23 +1,21 @@
-"""If these fail, the master misreads somebody else's FMU, blames the wrong unit, or leaves its files behind."""
+"""If these fail, the master misreads somebody else's FMU of FMI 2.0, or leaves its files behind."""
 
 import inspect
 import sys
-import tempfile
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from cardiac_cosim.fmus.build import build_fmu
 from cardiac_cosim.orchestrator.errors import InputError, ParticipantError
 from cardiac_cosim.orchestrator.participants.fmu import FmuParticipant
-from cardiac_cosim.orchestrator.participants.native import NativeParticipant
 from cardiac_cosim.orchestrator.participants.participant import Port
 from cardiac_cosim.units.mesh import Mesh
-from cardiac_cosim.units.registry import UNITS
 from pythonfmu.builder import FmuBuilder
+
+Join = Callable[..., FmuParticipant]
 
 _HEADER = """
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
@@ -139,176 +137,15 @@ def foreign(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: _make(name, text, folder) for name, text in _FOREIGN.items()}
 
 
-@pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder that temporary files go to in this test."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
-
-
-@pytest.fixture
-def join(temporary: Path) -> Iterator[Callable[..., FmuParticipant]]:
-    """Make a participant; closed when the test ends, and then nothing is left of it on disk or on the path."""
-    made: list[FmuParticipant] = []
-    path = list(sys.path)
-
-    def make(file: Path, name: str = "guest", **parameters: Any) -> FmuParticipant:
-        made.append(FmuParticipant(name, file, parameters))
-        return made[-1]
-
-    yield make
-    for participant in made:
-        participant.close()
-        # A second time does nothing.
-        participant.close()
-    assert list(temporary.iterdir()) == []
-    assert sys.path == path
-
-
-def _ready(participant: FmuParticipant) -> FmuParticipant:
-    participant.begin()
-    participant.complete()
-    return participant
-
-
-# --- this project's FMUs ---------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("unit", UNITS)
-def test_ports_and_values_are_those_of_the_native_participant(
-    unit: str, cases: dict, fmus: dict, join: Callable[..., FmuParticipant]
-) -> None:
-    case = cases[unit]
-    native = NativeParticipant(unit, unit, case.mesh, case.parameters)
-    packaged = join(fmus[unit], unit, **case.parameters)
-    assert packaged.inputs == native.inputs
-    assert packaged.outputs == native.outputs
-    for participant in (native, packaged):
-        participant.begin()
-        for name, values in case.first().items():
-            participant.set(name, values)
-        participant.complete()
-    for step, inputs in zip(case.steps, case.inputs, strict=True):
-        for participant in (native, packaged):
-            for name, values in inputs.items():
-                participant.set(name, values)
-            participant.start(*step)
-        for name, port in packaged.outputs.items():
-            values = packaged.get(name)
-            assert values.shape == port.shape
-            np.testing.assert_array_equal(values, native.get(name))
-
-
-def test_an_input_that_does_not_matter_is_not_live(fmus: dict, join: Callable[..., FmuParticipant]) -> None:
-    assert not join(fmus["active_stress"]).inputs["stretch"].live
-    assert join(fmus["active_stress"], length_dependence=0.5).inputs["stretch"].live
-
-
-def test_what_get_returns_is_the_callers(fmus: dict, cases: dict, join: Callable[..., FmuParticipant]) -> None:
-    participant = _ready(join(fmus["active_stress"]))
-    first = participant.get("active_stress")
-    participant.set("potential", cases["active_stress"].inputs[0]["potential"])
-    participant.start(0.0, 1e-3)
-    second = participant.get("active_stress")
-    assert not first.any()
-    assert second.any()
-
-
-def test_a_failing_step_says_why(fmus: dict, tiny: Mesh, join: Callable[..., FmuParticipant]) -> None:
-    participant = _ready(join(fmus["active_stress"], delay_function="seed"))
-    participant.set("potential", np.full(tiny.nodes, 20.0))
-    for _ in range(2):
-        with pytest.raises(ParticipantError, match=r"at node 0 \(potential 20.0 mV\).*use delay_function: gompertz$"):
-            participant.start(0.0, 1e-3)
-
-
-@pytest.mark.parametrize("unit", ["mechanics", "fiber_generator"])
-def test_a_mesh_without_boundaries_is_the_persons_error(
-    unit: str, tiny: Mesh, cases: dict, tmp_path: Path, join: Callable[..., FmuParticipant]
-) -> None:
-    bare = Mesh(tiny.points, tiny.cells, {"lid": tiny.boundary("base")})
-    participant = join(build_fmu(UNITS[unit], bare, tmp_path / "bare.fmu"), "pump")
-    participant.begin()
-    for name, values in cases[unit].first().items():
-        participant.set(name, values)
-    with pytest.raises(InputError, match=r"^unit 'pump': the mesh has no boundary named '\w+' \(it has: lid\)"):
-        participant.complete()
-
-
-def test_no_state_to_start_from_is_not_the_persons_error(
-    fmus: dict, cases: dict, join: Callable[..., FmuParticipant]
-) -> None:
-    participant = join(fmus["mechanics"], neo_hooke_log_sign="seed")
-    participant.begin()
-    for name, values in cases["mechanics"].first().items():
-        participant.set(name, values)
-    with pytest.raises(ParticipantError, match="no stress-free state to start from"):
-        participant.complete()
-
-
-def test_wrong_parameters_of_our_own(fmus: dict, join: Callable[..., FmuParticipant]) -> None:
-    for name, value, message in (
-        (
-            "delay_function",
-            "100%",
-            r"'delay_function' of type String cannot be '100%': .* is '100%'; choose one of: gom",
-        ),
-        ("slow_rate_per_ms", -1.0, r"'slow_rate_per_ms' of type Real cannot be -1.0: .*> 0"),
-        ("length_dependence", "strong", "'length_dependence' of type Real cannot be 'strong'"),
-        ("slow_rate", 1.0, "has no parameter 'slow_rate'; did you mean 'slow_rate_per_ms'"),
-        ("potential", 1.0, "has no parameter 'potential'"),
-    ):
-        with pytest.raises(InputError, match=f"^unit 'guest'.*{message}"):
-            join(fmus["active_stress"], **{name: value})
-
-
-def test_a_field_of_the_wrong_shape_is_refused(fmus: dict, tiny: Mesh, join: Callable[..., FmuParticipant]) -> None:
-    participant = _ready(join(fmus["active_stress"]))
-    # NumPy would spread the first two over all nodes.
-    for values in (np.array(20.0), np.full(1, 20.0), np.full(tiny.nodes + 1, 20.0)):
-        with pytest.raises(ParticipantError, match=r"'potential' of unit 'guest' got shape .*expected \(16,\)"):
-            participant.set("potential", values)
-
-
-def test_not_finite_is_refused(fmus: dict, tiny: Mesh, join: Callable[..., FmuParticipant]) -> None:
-    participant = _ready(join(fmus["active_stress"]))
-    values = np.zeros(tiny.nodes)
-    values[6] = np.nan
-    with pytest.raises(ParticipantError, match=r"'potential' .* is not finite at node \[6\]"):
-        participant.set("potential", values)
-
-
-def test_messages_reach_the_participant_they_belong_to(
-    fmus: dict, foreign: dict, tiny: Mesh, join: Callable[..., FmuParticipant]
-) -> None:
-    one = _ready(join(fmus["active_stress"], "one", delay_function="seed"))
-    stranger = _ready(join(foreign["Failing"], "stranger"))
-    other = _ready(join(fmus["active_stress"], "other", delay_function="seed"))
-    for participant, potential in ((one, 10.0), (other, 20.0)):
-        participant.set("potential", np.full(tiny.nodes, potential))
-    stranger.set("mode", np.array(3.0))
-    for _ in range(2):
-        with pytest.raises(ParticipantError, match=r"10\.0 mV"):
-            one.start(0.0, 1e-3)
-        with pytest.raises(ParticipantError, match=r"^only 50% sure %s$"):
-            stranger.start(0.0, 1e-3)
-        with pytest.raises(ParticipantError, match=r"20\.0 mV"):
-            other.start(0.0, 1e-3)
-    one.close()
-    with pytest.raises(ParticipantError, match=r"20\.0 mV"):
-        other.start(0.0, 1e-3)
-
-
 # --- other people's FMUs ---------------------------------------------------------------------------------------------
 
 
-def test_scalars_without_units(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
+def test_scalars_without_units(foreign: dict, join: Join) -> None:
     participant = join(foreign["Scalars"])
     assert participant.inputs == {"u": Port("u", None, (), "global", record="value")}
     assert participant.outputs == {"y": Port("y", None, (), "global", record="value")}
-    _ready(participant)
+    participant.begin()
+    participant.complete()
     participant.start(0.0, 0.1)
     # With the start values of its own.
     assert participant.get("y") == 0.5 * 2.0 * 3
@@ -318,8 +155,8 @@ def test_scalars_without_units(foreign: dict, join: Callable[..., FmuParticipant
     assert participant.get("y").shape == ()
 
 
-def test_parameters_of_all_types(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
-    participant = _ready(join(foreign["Scalars"], gain=10, count=7, negate=True, mode="offset"))
+def test_parameters_of_all_types(foreign: dict, ready: Join) -> None:
+    participant = ready(foreign["Scalars"], gain=10, count=7, negate=True, mode="offset")
     participant.set("u", np.array(2.0))
     participant.start(0.0, 0.1)
     assert participant.get("y") == -2.0 * 10.0 * 7 + 100.0
@@ -342,20 +179,19 @@ def test_parameters_of_all_types(foreign: dict, join: Callable[..., FmuParticipa
         ("u", 1.0, "has no parameter 'u'"),
     ],
 )
-def test_wrong_parameters_of_others(
-    name: str, value: Any, message: str, foreign: dict, join: Callable[..., FmuParticipant]
-) -> None:
+def test_wrong_parameters_of_others(name: str, value: Any, message: str, foreign: dict, join: Join) -> None:
     with pytest.raises(InputError, match=f"^unit 'guest'.*{message}"):
         join(foreign["Scalars"], **{name: value})
 
 
-def test_arrays_in_any_order(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
+def test_arrays_in_any_order(foreign: dict, join: Join) -> None:
     participant = join(foreign["Arrays"])
     assert {name: port.shape for name, port in participant.inputs.items()} == {"x": (2, 3)}
     assert {name: port.shape for name, port in participant.outputs.items()} == {"other": (), "a.v": (11,)}
     assert (participant.inputs["x"].unit, participant.inputs["x"].location) == (None, None)
     assert participant.outputs["a.v"].record == "value"
-    _ready(participant)
+    participant.begin()
+    participant.complete()
     participant.set("x", np.array([[1.0, -1.0, 3.0], [4.0, -1.0, -1.0]]))
     participant.start(0.0, 0.1)
     np.testing.assert_array_equal(participant.get("a.v"), 1000.0 * np.arange(1, 12) + 134.0)
@@ -373,11 +209,9 @@ def test_arrays_in_any_order(foreign: dict, join: Callable[..., FmuParticipant])
         ("wild", {"x[1]", "x[4000000000]"}),
     ],
 )
-def test_names_that_fill_no_array_are_scalars(
-    kind: str, names: set[str], tmp_path: Path, join: Callable[..., FmuParticipant]
-) -> None:
+def test_names_that_fill_no_array_are_scalars(kind: str, names: set[str], tmp_path: Path, ready: Join) -> None:
     # Of two scripts of one name PythonFMU would run the first twice.
-    participant = _ready(join(_make(f"Gapped_{kind.replace(' ', '_')}", _gapped(kind), tmp_path)))
+    participant = ready(_make(f"Gapped_{kind.replace(' ', '_')}", _gapped(kind), tmp_path))
     assert participant.outputs.keys() == names
     for name, port in participant.outputs.items():
         assert (port.shape, port.base) == ((), 1) if kind != "from zero" else ((2,), 0)
@@ -398,27 +232,37 @@ def test_names_that_fill_no_array_are_scalars(
         (5.0, r"^x{9000} the end$"),
     ],
 )
-def test_steps_that_fail_in_other_peoples_fmus(
-    mode: float, message: str, foreign: dict, join: Callable[..., FmuParticipant]
-) -> None:
-    participant = _ready(join(foreign["Failing"]))
+def test_steps_that_fail_in_other_peoples_fmus(mode: float, message: str, foreign: dict, ready: Join) -> None:
+    participant = ready(foreign["Failing"])
     participant.start(0.0, 0.1)
     participant.set("mode", np.array(mode))
     with pytest.raises(ParticipantError, match=message):
         participant.start(0.1, 0.1)
 
 
-def test_a_warning_is_no_error(foreign: dict, join: Callable[..., FmuParticipant]) -> None:
-    participant = _ready(join(foreign["Failing"]))
+def test_messages_are_not_mixed_up_with_those_of_our_fmus(fmus: dict, foreign: dict, tiny: Mesh, ready: Join) -> None:
+    own = ready(fmus["active_stress"], "own", delay_function="seed")
+    stranger = ready(foreign["Failing"], "stranger")
+    own.set("potential", np.full(tiny.nodes, 10.0))
+    stranger.set("mode", np.array(3.0))
+    for _ in range(2):
+        with pytest.raises(ParticipantError, match=r"10\.0 mV"):
+            own.start(0.0, 1e-3)
+        with pytest.raises(ParticipantError, match=r"^only 50% sure %s$"):
+            stranger.start(0.0, 1e-3)
+
+
+def test_a_warning_is_no_error(foreign: dict, ready: Join) -> None:
+    participant = ready(foreign["Failing"])
     participant.set("mode", np.array(4.0))
     participant.start(0.0, 0.1)
     assert participant.get("mode2") == 4.0
 
 
 def test_after_a_fatal_error_the_fmu_is_not_touched_again(
-    foreign: dict, outside: Callable[..., str], join: Callable[..., FmuParticipant]
+    foreign: dict, outside: Callable[..., str], ready: Join
 ) -> None:
-    participant = _ready(join(foreign["Failing"]))
+    participant = ready(foreign["Failing"])
     participant.set("mode", np.array(1.0))
     with pytest.raises(ParticipantError):
         participant.start(0.0, 0.1)
@@ -531,7 +375,7 @@ def _file(kind: str, source: Path, folder: Path) -> Path:
     ],
 )
 def test_files_that_are_no_fmu_for_us(
-    kind: str, message: str, foreign: dict, tmp_path: Path, temporary: Path, join: Callable[..., FmuParticipant]
+    kind: str, message: str, foreign: dict, tmp_path: Path, temporary: Path, join: Join
 ) -> None:
     path = _file(kind, foreign["Scalars"], tmp_path)
     with pytest.raises(InputError, match=message) as refusal:
