@@ -1,4 +1,4 @@
-"""If this fails, mechanics that is run by itself has sheets along its fibres, or takes other sheets than it was given."""
+"""If these fail, mechanics that is run by itself has sheets along its fibres, or takes others than it was given."""
 
 import numpy as np
 from cardiac_cosim.units.directions import SHEET_INPUT, given_sheet
