@@ -160,9 +160,8 @@ class Unit(ABC):
     def enter_initialization_mode(self) -> None:
         """From here inputs get their initial values."""
         self._require(Phase.INSTANTIATED)
-        for variable in self.inputs():
-            if variable.name not in self._inputs:
-                self._inputs[variable.name] = self._default(variable)
+        # New ones, since saved states hold the old.
+        self._inputs = {item.name: self._default(item) for item in self.inputs()} | self._inputs
         self.phase = Phase.INITIALIZATION
 
     def exit_initialization_mode(self) -> None:

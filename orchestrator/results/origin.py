@@ -22,8 +22,6 @@ _PACKAGES = (
     "meshio",
     "numpy",
     "pyamg",
-    "pythonfmu",
-    "pythonfmu3",
     "rslab",
     "scikit-fem",
     "scipy",
