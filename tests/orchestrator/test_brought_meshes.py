@@ -103,11 +103,13 @@ def test_wrong_surfaces_are_refused_without_mechanics_too(both: Any, small_heart
 def test_a_mesh_for_arrival_times_needs_no_anatomy(both: Any, small_heart: Mesh, tmp_path: Path) -> None:
     outer = small_heart.boundary("epicardium")
     path = _file(tmp_path / "o.msh", small_heart, epicardium=outer[:100])
-    # Fibres of another source are connected by their name; the unit alone asks for no surface.
+    # Of the mesh the unit alone asks for no surface; what it lacks is somebody who gives its fibres.
     given = "units={f: {unit: fiber_generator}}"
     _refused(both, path, "faces of the surface", sets=(given, "output.probes_mm={}"))
     shown, *_ = both(path, "units={e: {unit: eikonal, parameters: {stimulus_depth_mm: 5}}}")
-    assert shown.code == 0
+    assert shown.code == 2
+    assert "units.e: no output feeds its input 'fiber'" in shown.err
+    assert "surface" not in shown.err
 
 
 def test_what_was_left_out_is_told_by_show_and_run(both: Any, small_heart: Mesh, tmp_path: Path) -> None:
