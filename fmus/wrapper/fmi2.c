@@ -31,7 +31,9 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuT
 }
 
 FMI2_Export void fmi2FreeInstance(fmi2Component c) {
-    if (c != NULL) free_instance(c);
+    if (c == NULL) return;
+    forget_states(c);
+    free_instance(c);
 }
 
 FMI2_Export const char *fmi2GetTypesPlatform(void) { return "default"; }

@@ -94,6 +94,7 @@ FMI3_Export void fmi3FreeInstance(fmi3Instance instance) {
     /* An instance that its own step is still using stays. */
     if (own == NULL || !ready(&own->shared)) return;
     free(own->intermediate);
+    forget_states(&own->shared);
     free_instance(&own->shared);
 }
 

@@ -1,7 +1,6 @@
 /* See instance.h. */
 #include "instance.h"
 #include "resources.h"
-#include "state.h"
 #include "text.h"
 
 #include <stdlib.h>
@@ -85,7 +84,6 @@ void *instantiate(size_t size, const Log *log, const char *location, const char 
 
 void free_instance(Instance *own) {
     int thread = python.PyGILState_Ensure();
-    forget_states(own);
     python.Py_DecRef(own->slave);
     python.PyGILState_Release(thread);
     forget_texts(own);

@@ -32,6 +32,7 @@ static void forget(State **place) {
 }
 
 void forget_states(Instance *own) {
+    int thread = python.PyGILState_Ensure();
     for (State **place = &states; *place != NULL;) {
         if ((*place)->owner == own) {
             forget(place);
@@ -39,6 +40,7 @@ void forget_states(Instance *own) {
             place = &(*place)->next;
         }
     }
+    python.PyGILState_Release(thread);
 }
 
 /* Put the slave's state `object`, a reference that is taken over, into the state `old`, or a new one if it is NULL. */

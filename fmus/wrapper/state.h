@@ -14,7 +14,7 @@ Status state_size(Instance *own, void *state, size_t *size);
 Status serialize(Instance *own, void *state, void *bytes, size_t size);
 Status deserialize(Instance *own, const void *bytes, size_t size, void **slot);
 
-/* Free what `own` has, with the GIL. */
+/* Free what `own` has, before it is freed itself. */
 void forget_states(Instance *own);
 
 #endif
