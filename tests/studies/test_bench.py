@@ -43,6 +43,7 @@ def test_every_point_is_run_once(study: Path, tmp_path: Path, charted: Callable[
     assert len(after) == 9
 
 
+@pytest.mark.long
 def test_killed_at_random_moments_it_goes_on_where_it_was(study: Path, tmp_path: Path) -> None:
     study.write_text(study.read_text().replace("[0.5, 1, 2, 4]", "[0.5, 0.8, 1, 1.25, 2, 2.5, 4, 5, 10, 20]"))
     out = tmp_path / "killed"

@@ -130,6 +130,7 @@ def test_without_a_run_of_the_scenario_itself_there_is_no_budget(strand: Path, r
         error_budget(_variants(strand), runner(lambda scenario: None))
 
 
+@pytest.mark.long
 def test_what_is_trusted_is_within_a_factor_of_two_of_a_run_four_times_finer(strand: Path, tmp_path: Path) -> None:
     # The physics itself, and the yardstick of the whole: each run is made, whether the budget needed it or not.
     sets: dict[str, Any] = {"coupling.iterate": {"converge": {"stretch": {"relative": 0.01}}}}

@@ -34,6 +34,7 @@ def study(strand: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_strand_is_tuned_into_a_scenario_that_keeps_the_tolerance(
     strand: Path, tmp_path: Path, cosim: Callable[..., Any]
 ) -> None:
