@@ -282,9 +282,10 @@ def test_saving_states_needs_no_memory(cases: dict, make: Make) -> None:
     tracemalloc.start()
     try:
         grown(20, free=True)
-        # 42 doubles in 4 arrays; what is really kept shows in the second number.
-        assert grown(100, free=True) < 30_000
-        assert grown(40, free=False) > 40_000
+        # Python's own caches move by some kB; what is really kept, 42 doubles in 4 arrays, shows in the second number.
+        given_up, kept = grown(100, free=True), grown(100, free=False)
+        assert kept > 100_000
+        assert given_up < kept / 3
     finally:
         tracemalloc.stop()
     assert driver.messages == []
