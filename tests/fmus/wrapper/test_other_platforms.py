@@ -111,10 +111,10 @@ def test_under_wine_the_library_loads_and_says_what_is_missing(
     answers = wine(nowhere, "", "version", *(f"void:{name}" for name in names))
     assert answers == [f"version {fmi}.0", *(f"{name} 3" for name in names)]
     for location in _forms(windows, fmi):
-        told, new = wine(nowhere, location, "new")
+        told, new = wine(nowhere, location, "loud", "new")
         assert rf"the command {nowhere} does not run; set the environment variable COSIM_PYTHON" in told
         assert new == "new 0"
-    told, new = wine(nowhere, "C:\\nothing\\", "new")
+    told, new = wine(nowhere, "C:\\nothing\\", "loud", "new")
     assert told.endswith("there is no file load.py in the resources of the FMU, C:\\nothing")
     assert new == "new 0"
 
