@@ -11,9 +11,8 @@ from functools import cache
 from importlib.metadata import distribution, metadata, requires
 from inspect import cleandoc
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup, escape
 from ruamel.yaml import YAML
 
 from ..units.mesh import Mesh
@@ -21,6 +20,9 @@ from ..units.unit import Unit
 from ..units.variable import Causality, Location, Variable
 from .annotations import TOOL
 from .coordinates import coordinates
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 #: What an FMU imports beyond Python itself.
 PACKAGES = ("numpy", "scipy", "scikit-fem")
@@ -113,7 +115,11 @@ def rendered(template: str, **known: object) -> bytes:
 
 
 @cache
-def _templates() -> Environment:
+def _templates() -> "Environment":
+    # Imported here: who builds no FMU, because it is there already, need not wait for it.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+    from markupsafe import Markup, escape
+
     loader = FileSystemLoader(_OWN / "templates")
     found = Environment(loader=loader, autoescape=select_autoescape(), undefined=StrictUndefined)
     found.trim_blocks = found.lstrip_blocks = found.keep_trailing_newline = True

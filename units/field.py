@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import FloatArray, frozen
+from .arrays import FloatArray, IntArray, frozen
 from .errors import InvalidInput
 from .mesh import Mesh
 from .variable import Location, Variable
@@ -14,7 +14,7 @@ def checked_field(variable: Variable, value: ArrayLike | str, mesh: Mesh, unit: 
 
     InvalidInput for what is no number, of another shape, or not finite.
     """
-    what = f"{variable.causality.value} '{variable.name}' of unit '{unit}'"
+    what = _called(variable, unit)
     try:
         array = frozen(value)  # type: ignore[arg-type]
     except (TypeError, ValueError) as error:
@@ -22,8 +22,28 @@ def checked_field(variable: Variable, value: ArrayLike | str, mesh: Mesh, unit: 
     expected = variable.shape(mesh)
     if array.shape != expected:
         raise InvalidInput(f"{what} got shape {array.shape}, expected {expected}")
-    if not np.isfinite(array).all():
-        where = np.argwhere(~np.isfinite(np.atleast_1d(array)))[0]
-        place = variable.location.value if variable.location is not Location.GLOBAL else "index"
-        raise InvalidInput(f"{what} is not finite at {place} {where.tolist()}")
+    check_finite(variable, array, mesh, unit)
     return array
+
+
+def check_finite(variable: Variable, values: FloatArray, mesh: Mesh, unit: str, places: IntArray | None = None) -> None:
+    """InvalidInput for values that are not finite: those at `places` of the flattened array, or the whole of it."""
+    sound = np.isfinite(values)
+    if sound.all():
+        return
+    place = int(np.flatnonzero(~sound)[0] if places is None else places[~sound][0])
+    index = list(map(int, np.unravel_index(place, variable.shape(mesh) or (1,))))
+    kind = variable.location.value if variable.location is not Location.GLOBAL else "index"
+    raise InvalidInput(f"{_called(variable, unit)} is not finite at {kind} {index}")
+
+
+def check_limit(variable: Variable, values: FloatArray, unit: str) -> None:
+    """InvalidInput for values that are not above the limit of `variable`, if it has one."""
+    if variable.above is not None and values.size and not values.min() > variable.above:
+        raise InvalidInput(
+            f"{_called(variable, unit)} is {values.min():.6g} somewhere; it has to be above {variable.above:g}"
+        )
+
+
+def _called(variable: Variable, unit: str) -> str:
+    return f"{variable.causality.value} '{variable.name}' of unit '{unit}'"

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from .arrays import FloatArray, IntArray, frozen
 from .errors import CallOrderError, InvalidInput, StepFailure
-from .field import checked_field
+from .field import check_finite, check_limit, checked_field
 from .mesh import Mesh
 from .phase import Phase
 from .snapshot import Snapshot, State
 from .statistics import Statistic, statistics
 from .taken import Taken
-from .variable import Causality, Location, Scalar, Variable, parameters_of
+from .variable import Causality, Scalar, Variable, parameters_of
 
 Group = TypeVar("Group")
 _MS_PER_S = 1000.0
@@ -261,17 +261,8 @@ class Unit(ABC):
 
         They are those at `places` of its flattened array, or the whole, of its shape.
         """
-        sound = np.isfinite(values)
-        if not sound.all():
-            place = int(np.flatnonzero(~sound)[0] if places is None else places[~sound][0])
-            index = list(map(int, np.unravel_index(place, variable.shape(self.mesh) or (1,))))
-            kind = variable.location.value if variable.location is not Location.GLOBAL else "index"
-            raise InvalidInput(f"input '{variable.name}' of unit '{self.name}' is not finite at {kind} {index}")
-        if variable.above is not None and values.size and not values.min() > variable.above:
-            raise InvalidInput(
-                f"input '{variable.name}' of unit '{self.name}' is {values.min():.6g} somewhere; "
-                f"it has to be above {variable.above:g}"
-            )
+        check_finite(variable, values, self.mesh, self.name, places)
+        check_limit(variable, values, self.name)
 
     def get(self, name: str) -> Any:
         """A variable's value: read-only array of the declared shape, or the parameter's scalar.
@@ -469,7 +460,7 @@ class Unit(ABC):
 
     def _field(self, variable: Variable, value: ArrayLike | str) -> FloatArray:
         array = checked_field(variable, value, self.mesh, self.name)
-        self.check_values(variable, array)
+        check_limit(variable, array, self.name)
         return array
 
     def _parameter(self, name: str) -> Variable:

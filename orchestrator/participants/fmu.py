@@ -181,7 +181,7 @@ class FmuParticipant:
             # Inputs get their start values in the initialization mode (FMI 2.0.4, section 4.2.4).
             starts = start or {}
             inputs = {item.name: item for item in variables if item.causality == "input" and item.name in starts}
-            self._input_starts = [(item, starts[name]) for name, item in inputs.items()]
+            self._started, self._starts = list(inputs.values()), {name: starts[name] for name in inputs}
             # Made once a step, for it is shown at every call.
             self._activity = self._at_work()
             if not loaded:
@@ -205,8 +205,7 @@ class FmuParticipant:
         """See Participant."""
         with self._blaming_input():
             self._call(lambda calls: calls.enter_initialization_mode(self._start_s))
-        for variable, value in self._input_starts:
-            self._set_values([variable], {variable.name: value}, "start value")
+        self._set_values(self._started, self._starts, "start value")
 
     def complete(self) -> None:
         """See Participant."""
