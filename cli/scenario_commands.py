@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 
 from ..orchestrator.errors import InputError, Interrupted
-from ..orchestrator.scenario import Scenario
+from ..orchestrator.scenario import Scenario, parsed_assignments
 from .exit_codes import INTERRUPTED
 from .scenario_file import Assignments, ScenarioFile, about, opened, variants
 
@@ -25,15 +25,20 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the last checkpoint in the results folder, if there is one.")
     ] = False,
-    figures: Annotated[bool, typer.Option(help="Draw the figures when the run is done.")] = True,
+    figures: Annotated[bool, typer.Option(help="Draw the figures when the run has ended.")] = True,
+    report: Annotated[
+        bool, typer.Option(help="Write the report, report.html, a page to open in a browser, when the run has ended.")
+    ] = True,
     error_budget: Annotated[
         bool,
         typer.Option("--error-budget", help="Then run finer variants too, and tell the error of each number."),
     ] = False,
 ) -> None:
-    """Run a scenario and write time series, fields, coupling log, summary and figures."""
+    """Run a scenario and write time series, fields, coupling log, summary, figures and report."""
     # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
+    from ..orchestrator.results.request import Request
     from ..orchestrator.run import run_scenario
+    from ..report.presentation import FIGURES, PAGE, Presentation
 
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
     with opened(file, overrides) as (scenario, base):
@@ -41,7 +46,10 @@ def run(
         console = Console(stderr=True)
         with about(file):
             try:
-                outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume, figures)
+                request = Request(str(file), parsed_assignments(overrides))
+                parts = tuple(part for part, wanted in ((FIGURES, figures), (PAGE, report)) if wanted)
+                shown = Presentation(folder, scenario.name, request.settings, parts) if parts else None
+                outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume, shown, request)
             except Interrupted as error:
                 rest = (
                     ", to be continued with --resume" if error.resumable else "; no checkpoint was kept to go on from"

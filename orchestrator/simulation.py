@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .results.request import Request
 from .results.stored_run import StoredRun
 from .run import run_scenario
 from .scenario import Scenario, scenario_content, validated, with_settings
@@ -14,7 +15,6 @@ def simulate(
     settings: Mapping[str, Any] | None = None,
     output: Path | str | None = None,
     resume: bool = False,
-    figures: bool = False,
 ) -> StoredRun:
     """Run the scenario in `file` with the values of `settings` at their keys, and open its results.
 
@@ -26,8 +26,6 @@ def simulate(
         The results folder; `results/<name>` if not given.
     resume:
         Go on from the last checkpoint in that folder, if there is one; a run that is complete is not run again.
-    figures:
-        Draw them.
 
     Raises
     ------
@@ -39,4 +37,5 @@ def simulate(
     path = Path(file)
     scenario = validated(with_settings(scenario_content(path), settings or {}), Scenario, str(path))
     folder = Path("results") / scenario.name if output is None else Path(output)
-    return StoredRun(run_scenario(scenario, path.parent, folder, resume=resume, figures=figures).folder)
+    request = Request(str(path), settings or {})
+    return StoredRun(run_scenario(scenario, path.parent, folder, resume=resume, request=request).folder)

@@ -78,6 +78,13 @@ class StoredRun:
             return {}
         return content if isinstance(content, dict) else {}
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The keys of the scenario that were set to other values than its file has, with these values."""
+        request = self.summary.get("request")
+        settings = request.get("settings") if isinstance(request, dict) else None
+        return settings if isinstance(settings, dict) else {}
+
     def time_series(self) -> "pandas.DataFrame":
         """The time series as a data frame, texts included, indexed by `time_ms`; empty where there is none."""
         return _frame(self.folder / TIME_SERIES)

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from scipy.spatial import cKDTree
 
-from ...participants.participant import Values
-from ..stored_run import Body, StoredRun
+from ...orchestrator.participants.participant import Values
+from ...orchestrator.results.stored_run import Body, StoredRun
 from .scene import Painted, View, add_scale_bar, pen, shaded, show, strokes
 from .surface import Numbers, normals, section, sharp_edges, smoothing, surface
 

@@ -6,8 +6,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from ...participants.participant import Values
-from ..stored_run import StoredRun
+from ...orchestrator.participants.participant import Values
+from ...orchestrator.results.stored_run import StoredRun
 from .scene import Painted, View, add_scale_bar, pen, shaded, show
 from .surface import normals, sharp_edges, smoothing, surface
 

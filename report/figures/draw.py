@@ -7,8 +7,9 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..stored_run import StoredRun
-from ..whole import write_whole
+from ...orchestrator.results.stored_run import StoredRun
+from ...orchestrator.results.whole import write_whole
+from ..heading import heading_of
 from .fiber_layout import fiber_layout
 from .heart_potential import heart_potential
 from .lines import cavity_volumes, probe_potential
@@ -30,11 +31,14 @@ _DOTS_PER_INCH = 160
 _STILL = ("fiber_layout",)
 
 
-def draw_still(folder: Path) -> dict[str, bytes]:
-    """The pictures of what does not change over the run in `folder`, by name, as far as there is data for them."""
+def draw_still(folder: Path, heading: str) -> dict[str, bytes]:
+    """The pictures of what does not change over the run in `folder`, by name, as far as there is data for them.
+
+    `heading` is that of the run, whose summary is not there yet.
+    """
     run = StoredRun(folder)
     figures = {name: FIGURES[name](run) for name in _STILL}
-    return {name: _picture(figure) for name, figure in figures.items() if figure is not None}
+    return {name: _picture(figure, heading) for name, figure in figures.items() if figure is not None}
 
 
 def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list[Path]:
@@ -52,7 +56,7 @@ def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list
         picture = None if still is None else still.get(name)
         if picture is None:
             figure = draw(run)
-            picture = None if figure is None else _picture(figure)
+            picture = None if figure is None else _picture(figure, heading_of(run))
         if picture is None:
             path.unlink(missing_ok=True)
             continue
@@ -62,8 +66,9 @@ def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list
     return drawn
 
 
-def _picture(figure: Figure) -> bytes:
+def _picture(figure: Figure, heading: str) -> bytes:
     FigureCanvasAgg(figure)
+    figure.suptitle(heading, fontsize=11, x=0.01, ha="left")
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=_DOTS_PER_INCH)
     return content.getvalue()

@@ -6,13 +6,13 @@ import h5py
 import numpy as np
 import pytest
 from cardiac_cosim.orchestrator.participants.participant import Values
-from cardiac_cosim.orchestrator.results.figures.draw import draw_figures
-from cardiac_cosim.orchestrator.results.figures.fiber_layout import fiber_lines, helix_angle
-from cardiac_cosim.orchestrator.results.figures.heart_potential import chosen_frames
-from cardiac_cosim.orchestrator.results.figures.pressure_volume import pressure_volume
-from cardiac_cosim.orchestrator.results.figures.scene import View, shaded, strokes
-from cardiac_cosim.orchestrator.results.figures.surface import normals, section, sharp_edges, smoothing, surface
 from cardiac_cosim.orchestrator.results.stored_run import StoredRun
+from cardiac_cosim.report.figures.draw import draw_figures
+from cardiac_cosim.report.figures.fiber_layout import fiber_lines, helix_angle
+from cardiac_cosim.report.figures.heart_potential import chosen_frames
+from cardiac_cosim.report.figures.pressure_volume import pressure_volume
+from cardiac_cosim.report.figures.scene import View, shaded, strokes
+from cardiac_cosim.report.figures.surface import normals, section, sharp_edges, smoothing, surface
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 

@@ -1,5 +1,6 @@
-"""Draws the figures of the results folder that is its argument, when it is told to on its standard input (`drawing`).
+"""Presents the results in a folder when it is told to on its standard input; see `presentation`, which starts it.
 
+Its arguments are the folder, the process that asks, without which there is nothing to do, and what is to be made.
 `begun` says that the fields are there which do not change: what shows only them is drawn already then. `done` says that
 all is there; the answer, on the standard output, is a line of JSON. At the end of the input the process ends.
 """
@@ -11,17 +12,19 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from ...supervision import end_with
+from ..orchestrator.supervision import end_with
+from .heading import heading
+from .presentation import FIGURES
 
 
 def main() -> None:
-    """See the module. The arguments are the folder and the process that asks, without which there is nothing to do."""
+    """See the module."""
     # Ctrl-C is for the run, which ends this process, or lets it finish.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    folder, parent = Path(sys.argv[1]), int(sys.argv[2])
+    folder, parent, parts = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3:]
     end_with(parent)
     # Imported here: from now on the process ends with the other one.
-    from .draw import draw_figures, draw_still
+    from .figures.draw import draw_figures, draw_still
 
     # Whatever a library has to say is no answer.
     answers, sys.stdout = sys.stdout, sys.stderr
@@ -29,12 +32,14 @@ def main() -> None:
     for line in sys.stdin:
         answer: dict[str, Any] = {}
         try:
-            if line == "begun\n":
-                still = draw_still(folder)
+            if line.startswith("begun "):
+                if FIGURES in parts:
+                    still = draw_still(folder, heading(**json.loads(line.removeprefix("begun "))))
                 continue
-            draw_figures(folder, still)
+            if FIGURES in parts:
+                draw_figures(folder, still)
         except OSError as error:
-            answer = {"place": str(error.filename or folder / "figures"), "refused": error.strerror or str(error)}
+            answer = {"place": str(error.filename or folder), "refused": error.strerror or str(error)}
         except Exception:
             answer = {"bug": traceback.format_exc()}
         print(json.dumps(answer), file=answers, flush=True)

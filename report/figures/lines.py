@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...participants.participant import Values
-from ..stored_run import StoredRun
-from .colors import COLORS
+from ...orchestrator.participants.participant import Values
+from ...orchestrator.results.stored_run import StoredRun
+from ...studies.pictures.colors import COLORS
 
 _STYLES = ("-", "--", ":", "-.")
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
-from ...participants.participant import Values
+from ...orchestrator.participants.participant import Values
 
 Numbers = NDArray[np.int64]
 

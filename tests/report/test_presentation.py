@@ -11,10 +11,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from cardiac_cosim.orchestrator.drawing import Drawing
 from cardiac_cosim.orchestrator.errors import Interrupted, RunError
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.report.presentation import FIGURES, Presentation
 
 _PICTURES = ["cavity_volumes.png", "fiber_layout.png", "potential_at_probes.png", "potential_on_deformed_heart.png"]
 
@@ -29,7 +29,7 @@ def _processes(out: Path) -> list[int]:
                 ended = (entry / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
             except OSError:
                 continue
-            if str(out).encode() in arguments and any(part.endswith(b"results.figures") for part in arguments):
+            if str(out).encode() in arguments and b"cardiac_cosim.report" in arguments:
                 found += [] if ended else [int(entry.name)]
     return found
 
@@ -45,7 +45,8 @@ def _is_gone(out: Path) -> bool:
 
 def _draw(scenario: Path, out: Path, *sets: str, resume: bool = False) -> tuple[str, ...]:
     loaded = load_scenario(scenario, ("run.stop_ms=5", *sets))
-    return run_scenario(loaded, scenario.parent, out, resume=resume, figures=True).warnings
+    companion = Presentation(out, loaded.name, parts=(FIGURES,))
+    return run_scenario(loaded, scenario.parent, out, resume=resume, companion=companion).warnings
 
 
 def test_a_run_and_one_that_goes_on_are_drawn_alike(
@@ -91,7 +92,6 @@ def test_a_run_that_fails_leaves_no_process_that_waits_to_draw(small_scenario: P
     with pytest.raises(RunError):
         _draw(small_scenario, tmp_path / "out", "units.mechanics.parameters.neo_hooke_log_sign=seed")
     assert _processes(tmp_path / "out") == []
-    assert not (tmp_path / "out" / "figures").exists()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere processes end each other by the end of a pipe only")
@@ -115,27 +115,27 @@ def test_whatever_ends_a_run_ends_the_process_that_draws(number: int, small_scen
 
 
 def test_a_process_that_cannot_draw_is_told_of_and_spoils_nothing(tmp_path: Path) -> None:
-    with Drawing(tmp_path) as drawing:
+    with Presentation(tmp_path, parts=(FIGURES,)) as drawing:
         for process in _processes(tmp_path):
             os.kill(process, signal.SIGKILL)
         assert _is_gone(tmp_path)
         drawing.begin()
         (warning,) = drawing.finish()
-    assert "the process that draws them is gone; all other results are complete" in warning
+    assert "the process that makes them ended; all other results are complete" in warning
 
 
 def test_where_no_process_can_be_started_there_are_no_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no python"))
-    with Drawing(tmp_path) as drawing:
+    with Presentation(tmp_path, parts=(FIGURES,)) as drawing:
         drawing.begin()
         (warning,) = drawing.finish()
-    assert "are not drawn" in warning
+    assert "could not be made" in warning
 
 
 def test_a_bug_in_drawing_looks_like_one(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "fields.h5", "w") as file:
         file["points_mm"], file["cells"], file["fiber"] = np.eye(4, 3), [[0, 1, 2, 99]], [[1.0, 0.0, 0.0]]
-    with Drawing(tmp_path) as drawing:
+    with Presentation(tmp_path, parts=(FIGURES,)) as drawing:
         drawing.begin()
         with pytest.raises(RuntimeError, match=r"IndexError: .*99"):
             drawing.finish()
@@ -144,6 +144,6 @@ def test_a_bug_in_drawing_looks_like_one(tmp_path: Path) -> None:
 def test_a_file_of_a_librarys_name_where_we_are_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "matplotlib.py").write_text("raise SystemExit('run')")
-    with Drawing(tmp_path) as drawing:
+    with Presentation(tmp_path, parts=(FIGURES,)) as drawing:
         drawing.begin()
         assert drawing.finish() == ()

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..stored_run import StoredRun
-from .colors import COLORS
+from ...orchestrator.results.stored_run import StoredRun
+from ...studies.pictures.colors import COLORS
 
 _VOLUME, _PRESSURE = "_volume_ml", "_pressure_kPa"
 

@@ -17,7 +17,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import TriMesh
 from matplotlib.tri import Triangulation
 
-from ...participants.participant import Values
+from ...orchestrator.participants.participant import Values
 
 # Faces are quartered up to so many times: while they are few, where the cut goes through, and where a face has
 # different colours, by this part of the colour bar.
