@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from ..orchestrator.errors import InputError, Interrupted, RunError
+from ..orchestrator.results.names import PAGE
 from .exit_codes import INTERRUPTED
 from .scenario_file import Assignments, ScenarioFile, about, opened, variants
 
@@ -177,6 +178,11 @@ def append_budget(file: Path, variants: "Variants", folder: Path) -> None:
     from ..orchestrator.results.stored_run import StoredRun
 
     _budget(file, variants, folder, known=StoredRun(folder))
+    if (folder / PAGE).exists():
+        # Its headline numbers have errors now.
+        from ..report.page import write_page
+
+        write_page(folder)
 
 
 def _budget(

@@ -25,6 +25,7 @@ from .names import (
     FMU_LOG,
     GROWING,
     ITERATIONS,
+    PAGE,
     PARTS,
     SUMMARY,
     TIME_SERIES,
@@ -139,7 +140,7 @@ class ResultsFolder:
         implementations: Mapping[str, Implementation],
     ) -> Recording:
         # First what would let the rest pass for the result of an earlier run.
-        for name in (SUMMARY, *BUDGET):
+        for name in (SUMMARY, PAGE, *BUDGET):
             remove_stale(self.path / name)
         if before is None:
             remove_stale(self.path / CHECKPOINT)

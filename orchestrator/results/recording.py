@@ -13,6 +13,7 @@ from ..costs import Costs
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..errors import InputError, Interrupted, RunError, Terminated
+from ..omissions import omissions
 from ..participants.participant import Implementation
 from . import implementation
 from .appended import check
@@ -169,6 +170,7 @@ class Recording:
             "resumable": resumable,
             "warnings": [*self._assembly.warnings, *slower, *self.diagnosis],
             "implementation": implementation.texts(self._implementations),
+            "not_modelled": omissions(self._assembly.participants, self._assembly.connections),
             **self._request.content(),
         }
         scenario, costs = self._assembly.scenario, self._costs.content()

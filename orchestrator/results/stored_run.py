@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..participants.participant import Values
-from .names import COUPLING, FIELDS, SUMMARY, TIME_SERIES
+from .names import COUPLING, FIELDS, ITERATIONS, SUMMARY, TIME_SERIES
 
 if TYPE_CHECKING:
     import pandas
@@ -85,6 +85,14 @@ class StoredRun:
         settings = request.get("settings") if isinstance(request, dict) else None
         return settings if isinstance(settings, dict) else {}
 
+    def iterations(self) -> dict[str, Values]:
+        """The columns of iterations.csv, a row per sweep of an iterated step; empty where there is none."""
+        return _numbers(self.folder / ITERATIONS)
+
+    def coupling_columns(self) -> dict[str, Values]:
+        """The numbers of the coupling log by column, without a data frame; empty where there is none."""
+        return _numbers(self.folder / COUPLING)
+
     def time_series(self) -> "pandas.DataFrame":
         """The time series as a data frame, texts included, indexed by `time_ms`; empty where there is none."""
         return _frame(self.folder / TIME_SERIES)
@@ -119,6 +127,12 @@ class StoredRun:
         return self._read("points_mm")
 
     @cached_property
+    def cells(self) -> NDArray[np.int64] | None:
+        """The elements of any scene by their nodes: points to tetrahedra, shape (elements, 1 to 4)."""
+        cells = self._read("cells")
+        return None if cells is None else cells.astype(np.int64)
+
+    @cached_property
     def moving(self) -> tuple[str, ...]:
         """The names of the fields that have frames, with their units of measure."""
         if not self._fields.exists():
@@ -140,8 +154,12 @@ class StoredRun:
         """A changing field in a frame, shape (nodes or elements, ...); None if there is none."""
         return self._read(f"frames/{name}", number)
 
-    def _read(self, name: str, row: int | None = None) -> Values | None:
-        """A data set or one row of it. Where units share a name, `unit.name` of the first unit is read."""
+    def frames(self, name: str, every: int = 1) -> Values | None:
+        """A changing field in every so-many-th frame, shape (frames, nodes or elements, ...); None if there is none."""
+        return self._read(f"frames/{name}", slice(None, None, every))
+
+    def _read(self, name: str, row: int | slice | None = None) -> Values | None:
+        """A data set or rows of it. Where units share a name, `unit.name` of the first unit is read."""
         if not self._fields.exists():
             return None
         with h5py.File(self._fields, "r") as file:
@@ -150,7 +168,7 @@ class StoredRun:
                 return None
             within = file[group] if group else file
             found = [key for key in within if key == last or key.endswith(f".{last}")]
-            if not found or (row is not None and row >= len(within[found[0]])):
+            if not found or (isinstance(row, int) and row >= len(within[found[0]])):
                 return None
             values = within[found[0]]
             return np.asarray(values[:] if row is None else values[row])
