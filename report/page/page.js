@@ -234,12 +234,14 @@
         return;
       }
       busy = { again: draw };
+      document.body.dataset.drawing = "yes";
       while (busy.again) {
         const next = busy.again;
         busy.again = null;
         await next();
       }
       busy = null;
+      document.body.dataset.drawing = "no";
     }
 
     function goToFrame(frame) {
