@@ -59,6 +59,8 @@ def look(browser: Browser) -> Iterator[Callable[..., Look]]:
 
     def opened(path: Path, width: int = 1280, height: int = 900) -> Look:
         context = browser.new_context(viewport={"width": width, "height": height}, offline=True)
+        # Where much else runs, everything takes longer.
+        context.set_default_timeout(120_000)
         found = Look(context.new_page())
 
         def complain(message: ConsoleMessage) -> None:
@@ -70,7 +72,7 @@ def look(browser: Browser) -> Iterator[Callable[..., Look]]:
         asked: list[str] = []
         found.page.on("request", lambda request: asked.append(request.url))
         found.page.goto(path.as_uri())
-        found.page.wait_for_selector("body[data-ready]", state="attached", timeout=120_000)
+        found.page.wait_for_selector("body[data-ready]", state="attached")
         found.complaints += [url for url in asked if url != path.as_uri() and not url.startswith(("data:", "blob:"))]
         looks.append(found)
         return found
