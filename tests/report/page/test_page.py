@@ -15,7 +15,10 @@ from cardiac_cosim.orchestrator.run import show_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 from cardiac_cosim.report.page import prepared, write_page
 from cardiac_cosim.report.page.coupling_curves import constants, coupling_curves
+from cardiac_cosim.report.page.document import page
 from cardiac_cosim.report.page.headline_table import headline_table
+from cardiac_cosim.report.page.heart import heart
+from cardiac_cosim.report.page.packed import Packed
 from cardiac_cosim.report.page.run_curves import run_curves
 from cardiac_cosim.units.mesh.file import read_mesh
 from report_kinds import RunOf
@@ -40,6 +43,32 @@ def test_a_page_of_the_baselines_size_is_small(tmp_path: Path) -> None:
     path = write_page(tmp_path)
     assert path == tmp_path / "report.html"
     assert path.stat().st_size < _MOST_BYTES
+
+
+def test_of_long_runs_fewer_frames_are_shown_and_the_page_says_so(
+    run_of: RunOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = run_of("heart")
+    views = prepared(run.folder)
+    assert views is not None
+    assert "Of the stored frames" not in page(run, views)
+    numbers = 7 * len(views.shape.points) + len(views.shape.cells)
+    # Not quite three frames of nine.
+    monkeypatch.setattr("cardiac_cosim.report.page.heart._MOST_NUMBERS", 3 * numbers)
+    shown = heart(run, views, Packed())
+    assert shown is not None
+    assert shown["times_ms"] == [0.0, 15.0, 30.0]
+    assert shown["places"]["shape"][0] == shown["colorings"][0]["levels"]["shape"][0] == 3
+    assert "Of the stored frames one in 3 is shown." in page(run, views)
+
+
+def test_a_run_that_was_killed_is_shown_as_far_as_it_came(run_of: RunOf, tmp_path: Path) -> None:
+    for name in ("timeseries.csv", "coupling.csv", "fields.h5"):
+        shutil.copy(run_of("heart").folder / name, tmp_path)
+    text = write_page(tmp_path).read_text(encoding="utf-8")
+    assert "The run did not finish" in text
+    assert "the results up to 40 ms" in text
+    assert 'id="heart"' in text
 
 
 def test_the_page_is_the_same_whether_it_was_prepared_or_not(run_of: RunOf) -> None:
@@ -115,8 +144,8 @@ def test_what_is_not_modelled_is_kept_and_shown(small_scenario: Path, tmp_path: 
     assert "mechanics.lv_pressure: no unit gives it, so it keeps its start value" in told[0]
     shown = show_scenario(load_scenario(small_scenario, ()), small_scenario.parent)
     assert all(sentence in shown for sentence in told[0])
-    page = write_page(tmp_path / "native").read_text(encoding="utf-8")
-    assert all(f"<li>{sentence}</li>" in page for sentence in told[0])
+    written = write_page(tmp_path / "native").read_text(encoding="utf-8")
+    assert all(f"<li>{sentence}</li>" in written for sentence in told[0])
 
 
 def _cosim(*arguments: str) -> int:
