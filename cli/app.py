@@ -6,7 +6,7 @@ import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
-from . import scenario_commands, study_commands, verify_command
+from . import scenario_commands, schema_command, study_commands, verify_command
 from .exit_codes import INPUT_WRONG, RUN_FAILED
 
 app = typer.Typer(
@@ -24,6 +24,7 @@ for command in (
     study_commands.stability,
     study_commands.tune,
     verify_command.verify,
+    schema_command.schema,
 ):
     app.command()(command)
 
