@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
 from ..orchestrator.errors import InputError, Interrupted
 from ..orchestrator.scenario import Scenario
 from .exit_codes import INTERRUPTED
+from .manner import Manner, Quiet, Verbose
 from .scenario_file import Assignments, ScenarioFile, about, opened, variants
 
 
@@ -30,32 +30,34 @@ def run(
         bool,
         typer.Option("--error-budget", help="Then run finer variants too, and tell the error of each number."),
     ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run a scenario and write time series, fields, coupling log, summary and figures."""
     # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
     from ..orchestrator.run import run_scenario
 
+    manner = Manner(quiet, verbose)
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
     with opened(file, overrides) as (scenario, base):
         folder = output if output is not None else Path("results") / scenario.name
-        console = Console(stderr=True)
         with about(file):
             try:
-                outcome = run_scenario(scenario, base, folder, console, fmu_dir, resume, figures)
-            except Interrupted as error:
-                rest = (
-                    ", to be continued with --resume" if error.resumable else "; no checkpoint was kept to go on from"
+                outcome = run_scenario(
+                    scenario, base, folder, manner.console, fmu_dir, resume, figures, progress=not quiet
                 )
+            except Interrupted as error:
+                rest = "; continue with --resume" if error.resumable else "; no checkpoint was kept to continue from"
                 print(f"interrupted; the results so far are in {folder}{rest}", file=sys.stderr)
                 raise typer.Exit(INTERRUPTED + error.signal) from None
         for warning in outcome.warnings:
             _warn(warning)
-        _report(scenario, outcome.folder, outcome.summary)
+        _report(scenario, outcome.folder, outcome.summary, manner)
         if error_budget:
             # Imported here, because most runs do not need it.
             from .study_commands import append_budget
 
-            append_budget(file, variants(file, overrides, scenario, base), folder)
+            append_budget(file, variants(file, overrides, scenario, base), folder, manner)
 
 
 def build(
@@ -108,7 +110,7 @@ def show(file: ScenarioFile, assignments: Assignments = None) -> None:
         typer.echo(show_scenario(scenario, base))
 
 
-def _report(scenario: Scenario, folder: Path, summary: dict[str, Any]) -> None:
+def _report(scenario: Scenario, folder: Path, summary: dict[str, Any], manner: Manner) -> None:
     wall = summary["wall_s"]
     lines = [f"{scenario.name}: {summary['steps']} steps to {summary['end_ms']:g} ms in {wall['total']:.1f} s"]
     for probe, activation in summary["activation_time_ms"].items():
@@ -119,7 +121,7 @@ def _report(scenario: Scenario, folder: Path, summary: dict[str, Any]) -> None:
         then = f"{volume['min']:.2f} ml, ejection fraction {fraction:.2f}" if ejects else f"{volume['max']:.2f} ml"
         lines.append(f"  {chamber} volume: {volume['start']:.2f} -> {then}")
     lines.append(f"  results in {folder}")
-    typer.echo("\n".join(lines))
+    manner.say("\n".join(lines))
     late, missed = summary["unconverged_ms"], summary["tolerance_missed"]
     if late:
         _warn(

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from ..orchestrator.errors import InputError, Interrupted, RunError
 from .exit_codes import INTERRUPTED
+from .manner import Manner, Quiet, Verbose
 from .scenario_file import Assignments, ScenarioFile, about, opened, variants
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ def chart(
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Chart what settings of a scenario cost against how accurate they are.
 
@@ -51,17 +53,18 @@ def chart(
     from ..studies.plan import plan_study
 
     _one_of(workers, scheduler)
+    manner = Manner(quiet, verbose)
     plan = plan_study(file, assignments or [])
     folder = output or Path("results") / plan.study.name
-    console = Console(stderr=True)
+    console = manner.progress_console
     with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         charted = chart_study(plan, bench)
         with console.status("drawing the chart"):
             write_chart(charted, folder)
     for note in charted.notes:
-        typer.echo(f"note: {note}", err=True)
-    typer.echo(charted.summary())
-    typer.echo(f"  chart in {folder}")
+        manner.note(note)
+    manner.say(charted.summary())
+    manner.say(f"  chart in {folder}")
 
 
 def stability(
@@ -70,6 +73,8 @@ def stability(
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Map where a scenario is sound over two of its settings, and where it fails, and how.
 
@@ -82,17 +87,18 @@ def stability(
     from ..studies.stability.counts import summary
 
     _one_of(workers, scheduler)
+    manner = Manner(quiet, verbose)
     plan = plan_map(file, assignments or [])
     folder = output or Path("results") / plan.study.name
-    console = Console(stderr=True)
+    console = manner.progress_console
     with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         mapped = map_study(plan, bench)
         with console.status("drawing the map"):
             write_map(mapped, folder)
     for note in mapped.notes:
-        typer.echo(f"note: {note}", err=True)
-    typer.echo(summary(mapped))
-    typer.echo(f"  map in {folder}")
+        manner.note(note)
+    manner.say(summary(mapped))
+    manner.say(f"  map in {folder}")
 
 
 def tune(
@@ -116,6 +122,8 @@ def tune(
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Find the cheapest setting of a scenario that keeps the tolerances, and write it as a scenario that runs.
 
@@ -128,6 +136,7 @@ def tune(
     from ..studies.tuning import parsed_tolerances, summary, tune_scenario, tune_study, write_tuning
 
     _one_of(workers, scheduler)
+    manner = Manner(quiet, verbose)
     limits = parsed_tolerances(tolerances or [])
     if file.suffix.lower() == ".ssp":
         raise InputError(f"{file}: a tuned scenario is written as a YAML file, so tuning begins with one; give that")
@@ -136,7 +145,7 @@ def tune(
     plan = None if study is None else plan_study(study, assignments or [])
     name = load_scenario(file, assignments or []).name
     folder = output or Path("results") / (f"{name}.tune" if plan is None else plan.study.name)
-    console = Console(stderr=True)
+    console = manner.progress_console
     with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         if plan is None:
             tuning = tune_scenario(file, limits, bench, assignments or [], mesh)
@@ -145,11 +154,11 @@ def tune(
         with console.status("drawing the chart"):
             path = write_tuning(tuning, folder)
     for note in tuning.chart.notes:
-        typer.echo(f"note: {note}", err=True)
+        manner.note(note)
     if path is None:
         raise RunError(f"{summary(tuning)}; all that was run is in {folder / 'tune.csv'}")
-    typer.echo(summary(tuning))
-    typer.echo(f"  tuned scenario: {path}\n  all that was considered: {folder / 'tune.csv'}")
+    manner.say(summary(tuning))
+    manner.say(f"  tuned scenario: {path}\n  all that was considered: {folder / 'tune.csv'}")
 
 
 def errors(
@@ -158,6 +167,8 @@ def errors(
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Tell the numerical error of every number that a scenario gives, and which part of it comes from where.
 
@@ -165,24 +176,26 @@ def errors(
     and tolerances. A budget that was interrupted goes on where it stopped.
     """
     _one_of(workers, scheduler)
+    manner = Manner(quiet, verbose)
     with opened(file, assignments or []) as (scenario, base):
         folder = output or Path("results") / f"{scenario.name}.errors"
-        _budget(file, variants(file, assignments or [], scenario, base), folder, workers, scheduler)
-    typer.echo(f"  error budget in {folder}")
+        _budget(file, variants(file, assignments or [], scenario, base), folder, manner, workers, scheduler)
+    manner.say(f"  error budget in {folder}")
 
 
-def append_budget(file: Path, variants: "Variants", folder: Path) -> None:
+def append_budget(file: Path, variants: "Variants", folder: Path, manner: Manner) -> None:
     """Add the error budget of the run in `folder`, of the scenario in `file`, to that folder."""
     # Imported here, so that help does not wait for numerical libraries.
     from ..orchestrator.results.stored_run import StoredRun
 
-    _budget(file, variants, folder, known=StoredRun(folder))
+    _budget(file, variants, folder, manner, known=StoredRun(folder))
 
 
 def _budget(
     file: Path,
     variants: "Variants",
     folder: Path,
+    manner: Manner,
     workers: int | None = None,
     scheduler: str | None = None,
     known: "StoredRun | None" = None,
@@ -192,15 +205,15 @@ def _budget(
 
     # What is wrong with it is said with the file in front.
     variants.scenario({})
-    console = Console(stderr=True)
+    console = manner.progress_console
     with _resumable(folder), about(file), Bench(folder, console, workers, scheduler) as bench:
         budget = error_budget(variants, bench, known)
         with console.status("drawing the budget"):
             write_budget(budget, folder)
     for note in budget.notes:
-        typer.echo(f"note: {note}", err=True)
+        manner.note(note)
     for text in sentences(budget):
-        typer.echo(f"  {text}")
+        manner.say(f"  {text}")
 
 
 def _one_of(workers: int | None, scheduler: str | None) -> None:

@@ -17,7 +17,7 @@ from .coupling.master import Observer
 from .drawing import Drawing
 from .errors import InputError, Interrupted, RunError
 from .participants.native import Mesh
-from .progress import ProgressBar
+from .progress import RunProgress
 from .results import implementation
 from .results.folder import ResultsFolder
 from .results.origin import Origin
@@ -47,12 +47,14 @@ def run_scenario(
     resume: bool = False,
     figures: bool = False,
     mesh_of: MeshOf = checked_mesh,
+    progress: bool = True,
 ) -> Outcome:
     """Run `scenario`, whose paths are relative to `base`, and write the results to `output`.
 
-    Progress goes to `console`; FMUs are taken from `fmu_dir`, or from the user's cache. With `resume` the run goes on
-    from the last checkpoint in `output`, if there is one, and ends as if it had never stopped. `figures` are drawn
-    when it is done. `mesh_of` gives the scenario's mesh: whoever runs many scenarios on one mesh may have kept it.
+    Warnings go to `console`, and so does the `progress`, unless nobody wants to see it. FMUs are taken from `fmu_dir`,
+    or from the user's cache. With `resume` the run goes on from the last checkpoint in `output`, if there is one, and
+    ends as if it had never stopped. `figures` are drawn when it is done. `mesh_of` gives the scenario's mesh: whoever
+    runs many scenarios on one mesh may have kept it.
 
     Raises
     ------
@@ -73,14 +75,14 @@ def run_scenario(
         drawing = stack.enter_context(Drawing(output)) if figures else None
         summary = folder.complete() if resume else None
         if summary is None:
-            outcome = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing, mesh_of)
+            outcome = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing, mesh_of, progress)
         else:
             outcome = Outcome(output, summary)
             if drawing is not None:
                 drawing.begin()
         if drawing is None:
             return outcome
-        with console.status("drawing the figures"):
+        with (console if progress else Console(quiet=True)).status("drawing the figures"):
             return replace(outcome, warnings=(*outcome.warnings, *drawing.finish()))
 
 
@@ -94,6 +96,7 @@ def _run(
     started: float,
     drawing: Drawing | None,
     mesh_of: MeshOf,
+    progress: bool,
 ) -> Outcome:
     before = folder.checkpoint() if resume else None
     mesh = mesh_of(scenario, base)
@@ -124,7 +127,7 @@ def _run(
         _warn(console, implementation.fallbacks(implementations.values()))
         # Nothing in the folder was touched up to here.
         recording = folder.record(assembly, before, costs, implementations)
-        bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
+        bar = RunProgress(console if progress else Console(quiet=True), scenario.name, scenario.run.stop_ms)
         with recording, bar:
             if unready is not None:
                 raise unready
