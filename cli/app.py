@@ -6,15 +6,15 @@ import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
-from . import scenario_commands, schema_command, study_commands, verify_command
+from . import scenario_commands, schema_command, study_commands, verify_command, version
 from .exit_codes import INPUT_WRONG, RUN_FAILED
 
 app = typer.Typer(
-    help="A beating two-chamber heart as FMI co-simulation of exchangeable physics units.",
-    no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.callback(
+    help="A beating two-chamber heart as FMI co-simulation of exchangeable physics units.", no_args_is_help=True
+)(version.options)
 for command in (
     scenario_commands.run,
     scenario_commands.build,

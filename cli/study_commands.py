@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..orchestrator.errors import InputError, Interrupted, RunError
+from .completion import STUDIES, files_ending
 from .exit_codes import INTERRUPTED
 from .manner import Manner, Quiet, Verbose
 from .scenario_file import Assignments, ScenarioFile, about, opened, variants
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from ..orchestrator.results.stored_run import StoredRun
     from ..studies.plan import Variants
 
+StudyFile = Annotated[
+    Path,
+    typer.Argument(metavar="STUDY", help="The study, a YAML file.", autocompletion=files_ending(*STUDIES)),
+]
 Workers = Annotated[
     int | None,
     typer.Option(
@@ -35,7 +40,7 @@ Scheduler = Annotated[
 
 
 def chart(
-    file: Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")],
+    file: StudyFile,
     output: Annotated[Path | None, typer.Option(help="Folder of the study; default results/<name>.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -68,7 +73,7 @@ def chart(
 
 
 def stability(
-    file: Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")],
+    file: StudyFile,
     output: Annotated[Path | None, typer.Option(help="Folder of the study; default results/<name>.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -102,7 +107,10 @@ def stability(
 
 
 def tune(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="The scenario, a YAML file.", autocompletion=files_ending(*STUDIES)),
+    ],
     tolerances: Annotated[
         list[str] | None,
         typer.Option(
@@ -113,7 +121,10 @@ def tune(
     ] = None,
     study: Annotated[
         Path | None,
-        typer.Option(help="Choose among the points of this study, and compare with its reference."),
+        typer.Option(
+            help="Choose among the points of this study, and compare with its reference.",
+            autocompletion=files_ending(*STUDIES),
+        ),
     ] = None,
     mesh: Annotated[bool, typer.Option("--mesh", help="Vary the mesh too, and compare with a finer one.")] = False,
     output: Annotated[

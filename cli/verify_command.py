@@ -8,6 +8,7 @@ import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.quoting import shortened
+from .completion import FMUS, files_ending
 from .exit_codes import INPUT_WRONG
 
 if TYPE_CHECKING:
@@ -17,7 +18,14 @@ _HEAD = ("experiment", "variable", "largest deviation", "at [s]", "allowed", "ve
 
 
 def verify(
-    files: Annotated[list[Path], typer.Argument(metavar="FMU...", help="FMUs of FMI 2.0 or 3.0, from whatever tool.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FMU...",
+            help="FMUs of FMI 2.0 or 3.0, from any tool.",
+            autocompletion=files_ending(*FMUS),
+        ),
+    ],
 ) -> None:
     """Run the reference experiments in FMUs (FMI-LS-REF) again, and compare with the results in them.
 
