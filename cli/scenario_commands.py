@@ -15,7 +15,13 @@ from .scenario_file import Assignments, ScenarioFile, about, opened, variants
 
 def run(
     file: ScenarioFile,
-    output: Annotated[Path | None, typer.Option(help="Results folder; default results/<name>.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            help="The results folder. Default: results/<name>, or, where that has results of other settings, a folder "
+            "beside it whose name says how they differ."
+        ),
+    ] = None,
     assignments: Assignments = None,
     participants: Annotated[
         str | None,
@@ -40,7 +46,7 @@ def run(
     manner = Manner(quiet, verbose)
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
     with opened(file, overrides) as (scenario, base):
-        folder = output if output is not None else Path("results") / scenario.name
+        folder = output if output is not None else _default_folder(scenario, resume, manner)
         with about(file):
             try:
                 outcome = run_scenario(
@@ -108,6 +114,16 @@ def show(file: ScenarioFile, assignments: Assignments = None) -> None:
 
     with opened(file, assignments or []) as (scenario, base), about(file):
         typer.echo(show_scenario(scenario, base))
+
+
+def _default_folder(scenario: Scenario, resume: bool, manner: Manner) -> Path:
+    """Where results go when nobody says so, which is told before anything is computed."""
+    from ..orchestrator.results.default_folder import RESULTS, default_folder
+
+    folder = default_folder(scenario, resume)
+    plain = RESULTS / scenario.name
+    manner.say(f"results go to {folder}" + (f", because {plain} has other results" if folder != plain else ""))
+    return folder
 
 
 def _report(scenario: Scenario, folder: Path, summary: dict[str, Any], manner: Manner) -> None:
