@@ -108,12 +108,39 @@ def build(
             typer.echo(f"{path}\nnow: fmucontainer -fmu-directory {output} -container {path.name}")
 
 
-def show(file: ScenarioFile, assignments: Assignments = None) -> None:
+def show(
+    file: ScenarioFile,
+    assignments: Assignments = None,
+    graph: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PICTURE",
+            help="Draw the units, the fields between them, the loops and the execution order instead, into a file "
+            "that ends in .svg, .png or .pdf.",
+        ),
+    ] = None,
+    parameters: Annotated[
+        bool,
+        typer.Option(
+            "--parameters",
+            help="List the units' parameters instead, with values, defaults, units of measure and limits.",
+        ),
+    ] = False,
+) -> None:
     """Show what a scenario would build, exchange, solve and omit, without running it."""
-    from ..orchestrator.run import show_scenario
+    from ..orchestrator.showing import assembled, describe, graph_of, parameter_table
 
-    with opened(file, assignments or []) as (scenario, base), about(file):
-        typer.echo(show_scenario(scenario, base))
+    with opened(file, assignments or []) as (scenario, base), about(file), assembled(scenario, base) as assembly:
+        if parameters:
+            typer.echo(parameter_table(scenario))
+        if graph is not None:
+            # Imported here, because it takes a while, and nothing else needs it.
+            from ..orchestrator.showing.graph_picture import write_graph
+
+            write_graph(graph_of(assembly), graph)
+            typer.echo(f"graph in {graph}")
+        if graph is None and not parameters:
+            typer.echo(describe(assembly))
 
 
 def _default_folder(scenario: Scenario, resume: bool, manner: Manner) -> Path:

@@ -11,7 +11,7 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from .alarm import Alarm
-from .assembly import assemble, called_directly, checked_mesh
+from .assembly import assemble, checked_mesh
 from .costs import Costs
 from .coupling.master import Observer
 from .drawing import Drawing
@@ -22,7 +22,7 @@ from .results import implementation
 from .results.folder import ResultsFolder
 from .results.origin import Origin
 from .scenario import Scenario
-from .show import describe
+from .showing import assembled, describe
 from .stopping import StopRequest
 
 #: From a scenario, and the folder that its paths are relative to, to its mesh, if it has one.
@@ -158,7 +158,5 @@ def _about(path: Path) -> Iterator[None]:
 
 def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -> str:
     """What `scenario` builds, exchanges and solves, in words; nothing is computed but the mesh."""
-    mesh = checked_mesh(scenario, base)
-    with ExitStack() as stack:
-        assembly = assemble(stack, called_directly(scenario), base, mesh, fmu_dir, described=True)
+    with assembled(scenario, base, fmu_dir) as assembly:
         return describe(assembly)

@@ -18,6 +18,9 @@ _MOST_PROBLEMS, _LONGEST_ORIGIN = 20, 300
 #: Sections in sections that `--set` can name.
 _DEEPEST_KEY = 20
 
+#: Keys of `scene` that have no meaning any more when another is set.
+_REPLACED = {"mesh": ("geometry", "mesh_size_mm"), "geometry": ("mesh", "boundaries", "scale")}
+
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -62,6 +65,7 @@ def checked(content: dict[str, Any], path: Path, assignments: Sequence[str] = ()
         origin += " with " + shortened(", ".join(f"--set {text}" for text in assignments), _LONGEST_ORIGIN)
     for assignment in assignments:
         _assign(content, assignment)
+    _remove_replaced(content, parsed_assignments(assignments))
     return validated(content, Scenario, origin)
 
 
@@ -73,6 +77,7 @@ def with_settings(content: Mapping[str, Any], settings: Mapping[str, Any]) -> di
         if not _is_key(key, parts):
             raise InputError(f"{quoted(key)}: write a key of a scenario as coupling.step_ms")
         _place(changed, parts, value, quoted(key), "")
+    _remove_replaced(changed, settings)
     return changed
 
 
@@ -131,6 +136,19 @@ def _read(path: Path, kind: str) -> Any:
 def _assign(content: dict[str, Any], assignment: str) -> None:
     key, value = _parsed(assignment)
     _place(content, key.split("."), value, f"--set {shortened(assignment, _LONGEST_ORIGIN)}", "--set ")
+
+
+def _remove_replaced(content: dict[str, Any], settings: Mapping[str, Any]) -> None:
+    """Remove the geometry of a file in whose place a mesh was set, and the other way round.
+
+    What is set itself stays: who sets both is told that they contradict each other.
+    """
+    scene = content.get("scene")
+    for key, others in _REPLACED.items():
+        if isinstance(scene, dict) and settings.get(f"scene.{key}") is not None:
+            for other in others:
+                if f"scene.{other}" not in settings:
+                    scene.pop(other, None)
 
 
 def _place(content: dict[str, Any], parts: Sequence[str], value: Any, told: str, option: str) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from cardiac_cosim.orchestrator.coupling.timeline import Timeline
 from cardiac_cosim.orchestrator.errors import InputError
-from cardiac_cosim.orchestrator.scenario import Scenario, load_scenario
+from cardiac_cosim.orchestrator.scenario import Scenario, load_scenario, scenario_content, validated, with_settings
 
 FULL = """\
 name: baseline
@@ -373,6 +373,28 @@ def test_set_changes_one_value_and_nothing_else(tmp_path: Path, assignment: str,
     assert get(changed) == value
     section = assignment.replace(" ", "").split("=")[0].split(".")[0]
     assert changed.model_dump(exclude={section}) == plain.model_dump(exclude={section})
+
+
+def test_a_mesh_that_is_set_takes_the_place_of_a_geometry_and_the_other_way_round(tmp_path: Path) -> None:
+    (tmp_path / "full.yaml").write_text(FULL)
+    scene = load_scenario(tmp_path / "full.yaml", ["scene.refine=1", "scene.mesh=own.msh", "scene.scale=cm"]).scene
+    assert scene is not None
+    assert (scene.geometry, scene.mesh, scene.refine, scene.scale) == (None, "own.msh", 1, "cm")
+    own = FULL.replace("geometry: biventricle", "mesh: own.msh\n  scale: cm").replace("mesh_size_mm: 5", "refine: 1")
+    (tmp_path / "own.yaml").write_text(own)
+    scene = load_scenario(tmp_path / "own.yaml", ["scene.geometry=slab", "scene.mesh_size_mm=4"]).scene
+    assert scene is not None
+    assert (scene.geometry, scene.mesh, scene.mesh_size_mm, scene.refine) == ("slab", None, 4.0, 1)
+    # From Python and in studies alike.
+    changed = with_settings(scenario_content(tmp_path / "full.yaml"), {"scene.mesh": "own.msh"})
+    assert validated(changed, Scenario, "x").scene == Scenario.model_validate(changed).scene
+    # Nothing is removed that was set together with it, or by nobody.
+    for sets in (["scene.mesh=own.msh", "scene.mesh_size_mm=4"], ["scene.geometry=slab", "scene.mesh=own.msh"]):
+        with pytest.raises(InputError, match="mesh"):
+            load_scenario(tmp_path / "full.yaml", sets)
+    assert (
+        load_scenario(tmp_path / "full.yaml", ["scene.mesh=null"]).scene == load_scenario(tmp_path / "full.yaml").scene
+    )
 
 
 def test_set_applies_in_order_and_the_last_one_wins(tmp_path: Path) -> None:

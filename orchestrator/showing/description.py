@@ -5,15 +5,15 @@ from math import ceil
 
 import numpy as np
 
-from .assembly import Assembly
-from .coupling.build import idle
-from .coupling.connections import Connection
-from .coupling.loops import groups_in_order
-from .coupling.master import stepping_order
-from .participants.driven import Driven
-from .participants.native import Mesh, element_quality
-from .participants.participant import Participant, Port
-from .scenario import Scenario
+from ..assembly import Assembly
+from ..coupling.build import idle
+from ..coupling.connections import Connection
+from ..coupling.loops import groups_in_order
+from ..coupling.master import stepping_order
+from ..participants.driven import Driven
+from ..participants.native import Mesh, element_quality
+from ..participants.participant import Participant, Port
+from ..scenario import Scenario
 
 #: 10–90 % width of a depolarising front in mm (model.md, Numbers); an element longer than half of it is too coarse.
 _FRONT_MM = 7.9
