@@ -1,6 +1,8 @@
 """The command, put together."""
 
 import sys
+from collections.abc import Callable
+from inspect import getdoc
 
 import typer
 
@@ -8,6 +10,13 @@ from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
 from . import scenario_commands, schema_command, study_commands, verify_command, version
 from .exit_codes import INPUT_WRONG, RUN_FAILED
+
+
+def _paragraphs(command: Callable[..., None]) -> str:
+    """The help of a command without the line breaks of its source: a terminal has its own."""
+    paragraphs = getdoc(command) or ""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs.split("\n\n"))
+
 
 app = typer.Typer(
     pretty_exceptions_enable=False,
@@ -26,7 +35,7 @@ for command in (
     verify_command.verify,
     schema_command.schema,
 ):
-    app.command()(command)
+    app.command(help=_paragraphs(command))(command)
 
 
 def main() -> None:

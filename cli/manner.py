@@ -8,10 +8,14 @@ from rich.console import Console
 
 from ..orchestrator.errors import InputError
 
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but warnings and errors.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")]
 Verbose = Annotated[
     bool,
-    typer.Option("--verbose", "-v", help="Say what is set up and computed with, and what is done, a line for each."),
+    typer.Option(
+        "--verbose",
+        "-v",
+        help="Also print what is set up, what it computes with, and every output time or finished point.",
+    ),
 ]
 
 #: The program, of all whose floors a person may want to hear.

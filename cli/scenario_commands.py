@@ -25,21 +25,30 @@ def run(
     assignments: Assignments = None,
     participants: Annotated[
         str | None,
-        typer.Option(metavar="native|fmu|fmu3", help="Call the units directly, or by FMI 2.0 (default) or FMI 3.0."),
+        typer.Option(
+            metavar="native|fmu|fmu3",
+            help="How units are called: as FMUs of FMI 2.0 (fmu, the default) or FMI 3.0 (fmu3), or directly, without "
+            "FMI (native). The results are the same to the last bit.",
+        ),
     ] = None,
-    fmu_dir: Annotated[Path | None, typer.Option(help="Where FMUs are built; default: a user cache.")] = None,
+    fmu_dir: Annotated[
+        Path | None, typer.Option(help="The folder in which FMUs are built and kept. Default: the user's cache.")
+    ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on from the last checkpoint in the results folder, if there is one.")
+        bool, typer.Option("--resume", help="Continue from the last checkpoint in the results folder, if there is one.")
     ] = False,
-    figures: Annotated[bool, typer.Option(help="Draw the figures when the run is done.")] = True,
+    figures: Annotated[bool, typer.Option(help="Draw figures when the run is done.")] = True,
     error_budget: Annotated[
         bool,
-        typer.Option("--error-budget", help="Then run finer variants too, and tell the error of each number."),
+        typer.Option(
+            "--error-budget",
+            help="Afterwards run finer variants as well, and estimate the numerical error of every result.",
+        ),
     ] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run a scenario and write time series, fields, coupling log, summary and figures."""
+    """Run a scenario, and write its time series, fields, coupling log, summary and figures."""
     # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
     from ..orchestrator.run import run_scenario
 
@@ -68,26 +77,30 @@ def run(
 
 def build(
     file: ScenarioFile,
-    output: Annotated[Path, typer.Option(help="Where the FMUs go.")] = Path("fmus-built"),
+    output: Annotated[Path, typer.Option(help="The folder for the FMUs.")] = Path("fmus-built"),
     assignments: Assignments = None,
     ssp: Annotated[
         bool,
         typer.Option(
             "--ssp",
-            help="A system package too, <name>.ssp: of SSP 1.0, or with --fmi 3 of SSP 2.0, where a field is one "
-            "connection.",
+            help="Also write a system package, <name>.ssp, of SSP 1.0, or with --fmi 3 of SSP 2.0, in which a field "
+            "is one connection.",
         ),
     ] = False,
-    osp: Annotated[bool, typer.Option("--osp", help="The system structure for libcosim too (FMI 2.0).")] = False,
+    osp: Annotated[
+        bool, typer.Option("--osp", help="Also write the system structure for libcosim (FMI 2.0 only).")
+    ] = False,
     container: Annotated[
         bool,
-        typer.Option("--container", help="The description for fmucontainer too, which makes one FMU of all (FMI 2.0)."),
+        typer.Option(
+            "--container", help="Also write the description by which fmucontainer makes one FMU of all (FMI 2.0 only)."
+        ),
     ] = False,
     fmi: Annotated[
-        int, typer.Option("--fmi", min=2, max=3, help="FMI 2.0, or FMI 3.0, where a field is one array.")
+        int, typer.Option("--fmi", min=2, max=3, help="The version of FMI. In FMI 3.0 a field is one array.")
     ] = 2,
 ) -> None:
-    """Build the FMU of every unit in a scenario: one <unit name>.fmu each, on the scenario's mesh."""
+    """Build an FMU of every unit in a scenario, <unit name>.fmu, for the mesh of that scenario."""
     from ..orchestrator.build import build_fmus, write_container_file, write_osp_files, write_package
     from ..orchestrator.scene_warnings import scene_warnings
 
@@ -115,15 +128,15 @@ def show(
         Path | None,
         typer.Option(
             metavar="PICTURE",
-            help="Draw the units, the fields between them, the loops and the execution order instead, into a file "
-            "that ends in .svg, .png or .pdf.",
+            help="Instead of the text, draw a picture of the units, the fields between them, the loops and the "
+            "execution order, into a file that ends in .svg, .png or .pdf.",
         ),
     ] = None,
     parameters: Annotated[
         bool,
         typer.Option(
             "--parameters",
-            help="List the units' parameters instead, with values, defaults, units of measure and limits.",
+            help="Instead of the text, list the units' parameters with values, defaults, units of measure and limits.",
         ),
     ] = False,
 ) -> None:

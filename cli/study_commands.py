@@ -26,31 +26,31 @@ Workers = Annotated[
     int | None,
     typer.Option(
         min=1,
-        help="Run so many points at the same time, on a Dask cluster on this machine; processor seconds are compared "
-        "then. Default: one after the other.",
+        help="How many points are run at the same time, by processes on this machine; costs are compared in processor "
+        "seconds then. Default: the points are run one after the other.",
     ),
 ]
 Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="tcp://HOST:PORT",
-        help="Run the points by the workers of this Dask scheduler, which have to see the same files.",
+        help="The address of a Dask scheduler by whose workers the points are run; they have to see the same files.",
     ),
 ]
 
 
 def chart(
     file: StudyFile,
-    output: Annotated[Path | None, typer.Option(help="Folder of the study; default results/<name>.")] = None,
+    output: Annotated[Path | None, typer.Option(help="The folder of the study. Default: results/<name>.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Chart what settings of a scenario cost against how accurate they are.
+    """Chart what the settings of a scenario cost against how accurate they are.
 
-    Every point of the study is run once; a study that was interrupted goes on where it stopped.
+    Every point of the study is run once. The same command continues a study that was interrupted.
     """
     # Imported here, so that help does not wait for numerical libraries.
     from ..studies.bench import Bench
@@ -74,17 +74,17 @@ def chart(
 
 def stability(
     file: StudyFile,
-    output: Annotated[Path | None, typer.Option(help="Folder of the study; default results/<name>.")] = None,
+    output: Annotated[Path | None, typer.Option(help="The folder of the study. Default: results/<name>.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Map where a scenario is sound over two of its settings, and where it fails, and how.
+    """Map over two of its settings where a scenario is sound, and where and how it fails.
 
-    With the boundary that a theory predicts, if the study names one. Runs that fail are a result, and the exit code is
-    0. A study that was interrupted goes on where it stopped.
+    If the study names a theory, the map has the boundary that this predicts. Runs that fail are results too: the exit
+    code is 0. The same command continues a study that was interrupted.
     """
     # Imported here, so that help does not wait for numerical libraries.
     from ..studies.bench import Bench
@@ -126,9 +126,9 @@ def tune(
             autocompletion=files_ending(*STUDIES),
         ),
     ] = None,
-    mesh: Annotated[bool, typer.Option("--mesh", help="Vary the mesh too, and compare with a finer one.")] = False,
+    mesh: Annotated[bool, typer.Option("--mesh", help="Vary the mesh as well, and compare with a finer one.")] = False,
     output: Annotated[
-        Path | None, typer.Option(help="Folder of the results; default results/<name>.tune, or the study's.")
+        Path | None, typer.Option(help="The folder of the results. Default: results/<name>.tune, or that of the study.")
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -136,9 +136,9 @@ def tune(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Find the cheapest setting of a scenario that keeps the tolerances, and write it as a scenario that runs.
+    """Find the cheapest setting of a scenario that keeps given tolerances, and write it as a scenario file.
 
-    Only what may win is run, and once; a search that was interrupted goes on where it stopped.
+    Only settings that may be the cheapest are run, each once. The same command continues a search that was interrupted.
     """
     # Imported here, so that help does not wait for numerical libraries.
     from ..orchestrator.scenario import load_scenario
@@ -174,17 +174,19 @@ def tune(
 
 def errors(
     file: ScenarioFile,
-    output: Annotated[Path | None, typer.Option(help="Folder of the budget; default results/<name>.errors.")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="The folder of the error budget. Default: results/<name>.errors.")
+    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Tell the numerical error of every number that a scenario gives, and which part of it comes from where.
+    """Estimate the numerical error of every result of a scenario, and how much of it each source contributes.
 
-    The scenario is run as it is, and finer in one source of error at a time: communication step, internal steps, meshes
-    and tolerances. A budget that was interrupted goes on where it stopped.
+    The scenario is run as it is, and again with one source of error refined at a time: communication step, internal
+    steps, meshes and tolerances. The same command continues a budget that was interrupted.
     """
     _one_of(workers, scheduler)
     manner = Manner(quiet, verbose)
@@ -229,7 +231,9 @@ def _budget(
 
 def _one_of(workers: int | None, scheduler: str | None) -> None:
     if workers is not None and scheduler is not None:
-        raise InputError("--workers starts workers of its own, and --scheduler has some; give one of the two")
+        raise InputError(
+            "--workers starts processes on this machine, --scheduler uses those of a cluster; give one of the two"
+        )
 
 
 @contextmanager

@@ -27,10 +27,10 @@ def verify(
         ),
     ],
 ) -> None:
-    """Run the reference experiments in FMUs (FMI-LS-REF) again, and compare with the results in them.
+    """Repeat the reference experiments that FMUs contain (FMI-LS-REF), and compare with the results stored there.
 
-    Exit code 0: all within tolerance; 2: no FMU, no reference experiments in it, or damaged ones; 3: an experiment
-    deviates from its results, or the FMU failed.
+    Exit code 0: all results are within their tolerance. 2: a file is no FMU, or its reference experiments are missing
+    or damaged. 3: an experiment deviates from its stored results, or the FMU failed.
     """
     # Imported here, so that help does not wait for numerical and FMI libraries.
     from ..orchestrator.verification import verify_fmu

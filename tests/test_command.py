@@ -1,4 +1,4 @@
-"""If these fail, a person cannot find out which version they have, or their shell completes nothing, or what is wrong."""
+"""If these fail, nobody can find out which version they have, or their shell completes nothing, or what is wrong."""
 
 import os
 import subprocess
