@@ -113,6 +113,10 @@ class StoredRun:
         """See the class."""
         return _numbers(self.folder / TIME_SERIES)
 
+    def numbers(self, name: str) -> dict[str, Values]:
+        """The columns of numbers of another table in the folder, as `columns`; empty where there is none."""
+        return _numbers(self.folder / name)
+
     @cached_property
     def points_mm(self) -> Values | None:
         """The undeformed nodes of any scene, shape (nodes, 3)."""

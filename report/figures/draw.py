@@ -1,6 +1,7 @@
 """All figures of a results folder."""
 
 import io
+import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -10,10 +11,16 @@ from matplotlib.figure import Figure
 from ...orchestrator.results.stored_run import StoredRun
 from ...orchestrator.results.whole import write_whole
 from ..heading import heading_of
+from .cavity_volumes import cavity_volumes
+from .cell_response import cell_response
 from .fiber_layout import fiber_layout
 from .heart_potential import heart_potential
-from .lines import cavity_volumes, probe_potential
+from .other_outputs import other_outputs
 from .pressure_volume import pressure_volume
+from .probe_potential import probe_potential
+from .residuals import residuals
+from .space_time import space_time
+from .wall_motion import wall_motion
 
 #: Each figure by its file name; one that finds no data in the run returns None.
 FIGURES: dict[str, Callable[[StoredRun], Figure | None]] = {
@@ -22,9 +29,17 @@ FIGURES: dict[str, Callable[[StoredRun], Figure | None]] = {
     "potential_at_probes": probe_potential,
     "cavity_volumes": cavity_volumes,
     "pressure_volume": pressure_volume,
+    "wall_motion": wall_motion,
+    "cell_response": cell_response,
+    "potential_along_the_strand": space_time,
+    "other_outputs": other_outputs,
+    "residuals": residuals,
 }
 
 _DOTS_PER_INCH = 160
+
+#: Of a heading, at least.
+_LETTERS_PER_INCH = 12
 
 
 #: Those that show only what does not change over a run.
@@ -68,7 +83,8 @@ def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list
 
 def _picture(figure: Figure, heading: str) -> bytes:
     FigureCanvasAgg(figure)
-    figure.suptitle(heading, fontsize=11, x=0.01, ha="left")
+    lines = textwrap.fill(heading, int(_LETTERS_PER_INCH * figure.get_figwidth()))
+    figure.suptitle(lines, fontsize=11, x=0.01, ha="left")
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=_DOTS_PER_INCH)
     return content.getvalue()

@@ -54,7 +54,7 @@ def test_every_figure_is_drawn_from_what_a_run_leaves(tmp_path: Path) -> None:
     columns = "time_ms,potential_apex_mV,lv_volume_ml,lv_pressure_kPa"
     _write_series(tmp_path, f"{columns}\n0.0,-80.0,38.0,0.0\n5.0,-79.0,37.5,0.1\n")
     drawn = draw_figures(tmp_path)
-    assert _names(drawn) == _ALL
+    assert _names(drawn) == [*_ALL, "other_outputs"]
     for path in drawn:
         assert path.parent == tmp_path / "figures"
         assert path.read_bytes().startswith(_PNG_START)
@@ -68,7 +68,7 @@ def test_pressure_is_drawn_over_the_volume_of_its_own_cavity(tmp_path: Path) -> 
     figure = pressure_volume(StoredRun(tmp_path))
     assert figure is not None
     curve, begin = figure.axes[0].lines
-    assert curve.get_label() == "LV"
+    assert curve.get_label() == "left ventricle; the dot is the beginning"
     np.testing.assert_array_equal(curve.get_xydata(), [[38.0, 0.0], [40.0, 1.5]])
     np.testing.assert_array_equal(begin.get_xydata(), [[38.0, 0.0]])
 
