@@ -6,7 +6,7 @@ import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
-from . import scenario_commands, study_commands, verify_command
+from . import comparison_commands, scenario_commands, study_commands, verify_command
 from .exit_codes import INPUT_WRONG, RUN_FAILED
 
 app = typer.Typer(
@@ -23,6 +23,8 @@ for command in (
     study_commands.errors,
     study_commands.stability,
     study_commands.tune,
+    comparison_commands.sweep,
+    comparison_commands.compare,
     verify_command.verify,
 ):
     app.command()(command)

@@ -50,11 +50,11 @@ def chart(
     from ..studies.chart import chart_study, write_chart
     from ..studies.plan import plan_study
 
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     plan = plan_study(file, assignments or [])
     folder = output or Path("results") / plan.study.name
     console = Console(stderr=True)
-    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         charted = chart_study(plan, bench)
         with console.status("drawing the chart"):
             write_chart(charted, folder)
@@ -81,11 +81,11 @@ def stability(
     from ..studies.stability import map_study, plan_map, write_map
     from ..studies.stability.counts import summary
 
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     plan = plan_map(file, assignments or [])
     folder = output or Path("results") / plan.study.name
     console = Console(stderr=True)
-    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         mapped = map_study(plan, bench)
         with console.status("drawing the map"):
             write_map(mapped, folder)
@@ -127,7 +127,7 @@ def tune(
     from ..studies.plan import plan_study
     from ..studies.tuning import parsed_tolerances, summary, tune_scenario, tune_study, write_tuning
 
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     limits = parsed_tolerances(tolerances or [])
     if file.suffix.lower() == ".ssp":
         raise InputError(f"{file}: a tuned scenario is written as a YAML file, so tuning begins with one; give that")
@@ -137,7 +137,7 @@ def tune(
     name = load_scenario(file, assignments or []).name
     folder = output or Path("results") / (f"{name}.tune" if plan is None else plan.study.name)
     console = Console(stderr=True)
-    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         if plan is None:
             tuning = tune_scenario(file, limits, bench, assignments or [], mesh)
         else:
@@ -164,7 +164,7 @@ def errors(
     The scenario is run as it is, and finer in one source of error at a time: communication step, internal steps, meshes
     and tolerances. A budget that was interrupted goes on where it stopped.
     """
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     with opened(file, assignments or []) as (scenario, base):
         folder = output or Path("results") / f"{scenario.name}.errors"
         _budget(file, variants(file, assignments or [], scenario, base), folder, workers, scheduler)
@@ -193,7 +193,7 @@ def _budget(
     # What is wrong with it is said with the file in front.
     variants.scenario({})
     console = Console(stderr=True)
-    with _resumable(folder), about(file), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), about(file), Bench(folder, console, workers, scheduler) as bench:
         budget = error_budget(variants, bench, known)
         with console.status("drawing the budget"):
             write_budget(budget, folder)
@@ -203,13 +203,14 @@ def _budget(
         typer.echo(f"  {text}")
 
 
-def _one_of(workers: int | None, scheduler: str | None) -> None:
+def one_of(workers: int | None, scheduler: str | None) -> None:
+    """InputError where both are given."""
     if workers is not None and scheduler is not None:
         raise InputError("--workers starts workers of its own, and --scheduler has some; give one of the two")
 
 
 @contextmanager
-def _resumable(folder: Path) -> Iterator[None]:
+def resumable(folder: Path) -> Iterator[None]:
     """Say how to go on with a study that a signal stopped."""
     try:
         yield
