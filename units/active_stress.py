@@ -16,8 +16,9 @@ With `length_dependence` η the output is s_a (1 + η(λ − 1)), λ averaged fr
 (Frank–Starling). Active stress and mechanics then form an algebraic loop. What a mechanics needs to be stable in it is
 given too: the active stiffness K_a = ∂s_a/∂λ = s_a η, and the stretch at which both hold (Regazzoni & Quarteroni 2021).
 
-How it fails: the delay function as the seed prints it, ε₀ + (ε₀ − ε₁) exp(…), is negative in depolarised tissue, and
-the active stress runs away from its target instead of to it. A relaxation rate that is not positive ends the step.
+How it fails: the delay function as printed in the source document (`delay_function: as_printed`), ε₀ + (ε₀ − ε₁)
+exp(…), is negative in depolarised tissue, so that the active stress moves away from its target instead of towards it.
+A relaxation rate that is not positive ends the step with StepFailure.
 """
 
 from dataclasses import dataclass
@@ -55,8 +56,8 @@ class Tension:
     delay_function: str = parameter(
         "gompertz",
         "1",
-        "gompertz: eps_0 + (eps_1 - eps_0) exp(-exp(..)); seed: eps_0 + (eps_0 - eps_1) exp(-exp(..)), unstable",
-        choices=("gompertz", "seed"),
+        "gompertz: eps_0 + (eps_1 - eps_0) exp(-exp(..)); as_printed: eps_0 + (eps_0 - eps_1) exp(-exp(..)), unstable",
+        choices=("gompertz", "as_printed"),
     )
     length_dependence: float = parameter(0.0, "1", "eta, relative active stress per stretch (Frank-Starling)")
     time_integration: str = parameter(
@@ -83,7 +84,7 @@ class Tension:
     @property
     def _jump(self) -> float:
         jump = self.fast_rate_per_ms - self.slow_rate_per_ms
-        return -jump if self.delay_function == "seed" else jump
+        return -jump if self.delay_function == "as_printed" else jump
 
     def _exponent(self, potential: FloatArray) -> FloatArray:
         exponent = -self.delay_slope_per_mV * (potential - self.tension_threshold_potential_mV)
@@ -224,8 +225,8 @@ class ActiveStress(Differentiable):
                 f"the delay function gives the rate {rate[node]:.3g}/ms at node {node} (potential "
                 f"{potential[node]:.1f} mV): the active stress would grow without bound, away from its target"
                 + (
-                    ". That is the delay as the seed prints it; use delay_function: gompertz"
-                    if self._tension.delay_function == "seed"
+                    ". That is the delay function as printed in the source document; use delay_function: gompertz"
+                    if self._tension.delay_function == "as_printed"
                     else ""
                 )
             )

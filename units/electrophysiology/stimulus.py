@@ -10,7 +10,7 @@ from ..errors import InvalidInput
 from ..mesh import Mesh
 from ..variable import VOLTAGE, parameter
 
-#: Depth in mm that stands for the seed's surface stimulus (Z > −1e-4 mm) when the depth is given as 0.
+#: Depth in mm that stands for a stimulus of the surface (Z > −1e-4 mm) when the depth is given as 0.
 _SURFACE = 1e-4
 
 #: Part of a mesh's nodes above which a stimulus is more than a place where a wave begins.

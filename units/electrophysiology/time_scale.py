@@ -17,7 +17,7 @@ class TimeScale:
     """β_t = β (1 − τ₀ (t_a − t₀)/(t₁ − t₀)): what activates later repolarises faster.
 
     The expected activation time t_a is linear in Z. `last_first` grows from the base to the apex, so that the last to
-    depolarise is the first to repolarise, as observed. `seed` is the printed t_a = t_apex (1 − Z/Z_apex), by which
+    depolarise is the first to repolarise, as observed. `as_printed` is t_a = t_apex (1 − Z/Z_apex), by which
     the base repolarises first: it runs and contradicts the text around it.
 
     An ionic model of dimensionless time takes β_t as its unit of time. One whose time constants are in ms has them as
@@ -34,8 +34,8 @@ class TimeScale:
     activation_time_map: str = parameter(
         "last_first",
         "1",
-        "expected activation time along Z: last_first grows towards the apex, seed towards the base",
-        choices=("last_first", "seed"),
+        "expected activation time along Z: last_first grows towards the apex, as_printed towards the base",
+        choices=("last_first", "as_printed"),
     )
 
     def warnings(self, mesh: Mesh) -> Iterator[str]:
@@ -50,7 +50,7 @@ class TimeScale:
     def __call__(self, z: FloatArray) -> FloatArray:
         """β_t in ms at the heights `z` in mm; InvalidInput where it is not positive."""
         height = z / self.apex_z_mm
-        expected = self.apex_activation_time_ms * (1.0 - height if self.activation_time_map == "seed" else height)
+        expected = self.apex_activation_time_ms * (1.0 - height if self.activation_time_map == "as_printed" else height)
         span = self.time_scale_end_ms - self.time_scale_start_ms
         if span == 0.0:
             raise InvalidInput("time_scale_start_ms equals time_scale_end_ms; they have to differ")
