@@ -26,7 +26,7 @@ class Stimulus:
     stimulus_x_max_mm: float = parameter(31.0, "mm", "upper X limit of the stimulus box")
     stimulus_half_width_mm: float = parameter(10.0, "mm", "limit of |Y| of the stimulus box", above=0.0)
     stimulus_depth_mm: float = parameter(
-        2.0, "mm", "depth of the stimulus box below the base; 0: the base's nodes only", at_least=0.0
+        2.0, "mm", "depth of the stimulus box below the base; 0: only the nodes of the base", at_least=0.0
     )
 
     def nodes(self, points: FloatArray) -> np.ndarray:

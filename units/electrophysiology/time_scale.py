@@ -29,7 +29,9 @@ class TimeScale:
     time_scale_reduction: float = parameter(0.55, "1", "tau_0, relative reduction of beta at t_a = t_1")
     time_scale_start_ms: float = parameter(12.0, "ms", "t_0, start of the reduction")
     time_scale_end_ms: float = parameter(75.0, "ms", "t_1, end of the reduction")
-    apex_activation_time_ms: float = parameter(50.0, "ms", "expected activation time across the height", at_least=0.0)
+    apex_activation_time_ms: float = parameter(
+        50.0, "ms", "t_apex, difference of the expected activation times of apex and base", at_least=0.0
+    )
     apex_z_mm: float = parameter(-70.0, "mm", "Z of the left ventricle's apex", below=0.0)
     activation_time_map: str = parameter(
         "last_first",
