@@ -135,7 +135,7 @@ class ActiveStress(Differentiable):
             "reference_stretch",
             Causality.OUTPUT,
             "1",
-            "stretch at which active stress and active stiffness hold; 0 without length dependence",
+            "stretch at which active stress and active stiffness apply; 0 without length dependence",
             Location.ELEMENT,
             depends_on=("stretch",),
             pointwise=True,

@@ -52,7 +52,7 @@ class Hold:
     hold: str = parameter(
         "free",
         "1",
-        "free: the fibre shortens as it likes; isometric: it keeps its length",
+        "free: the fibre shortens freely; isometric: it keeps its length",
         choices=("free", "isometric"),
     )
 

@@ -86,7 +86,7 @@ class Mechanics(Differentiable):
             "reference_stretch",
             Causality.INPUT,
             "1",
-            "stretch at which active stress and active stiffness hold; 0: the unit's own at the begin of the step",
+            "stretch at which active stress and active stiffness apply; 0: the value at the beginning of the step",
             Location.ELEMENT,
             needs="stabilization",
         ),
