@@ -429,7 +429,7 @@ def test_a_field_that_cannot_be_fetched_leaves_no_half_a_frame(
 def test_a_failed_run_of_the_heart_says_so_in_its_summary(small_heart_file: Path, tmp_path: Path) -> None:
     units = {
         "electrophysiology": {"unit": "electrophysiology", "parameters": {"stimulus_depth_mm": 5.0}},
-        "active_stress": {"unit": "active_stress", "parameters": {"delay_function": "seed"}},
+        "active_stress": {"unit": "active_stress", "parameters": {"delay_function": "as_printed"}},
         "fibers": {"unit": "fiber_generator"},
     }
     with pytest.raises(RunError, match="unit 'active_stress' failed in the step") as caught:

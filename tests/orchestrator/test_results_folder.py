@@ -498,7 +498,7 @@ def test_a_file_that_cannot_be_closed_neither_loses_the_summary_nor_hides_the_ph
 
     monkeypatch.setattr(Fields, "close", refuse)
     with pytest.raises(RunError, match=r"unit 'active_stress' failed in the step.*besides") as caught:
-        _run(small_scenario, tmp_path / "out", "units.active_stress.parameters.delay_function=seed")
+        _run(small_scenario, tmp_path / "out", "units.active_stress.parameters.delay_function=as_printed")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (summary["status"], summary["message"]) == ("failed", str(caught.value))
     # The frames are what is left of the fields then.

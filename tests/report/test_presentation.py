@@ -90,7 +90,7 @@ class _StopsAtOnce:
 
 def test_a_run_that_fails_leaves_no_process_that_waits_to_draw(small_scenario: Path, tmp_path: Path) -> None:
     with pytest.raises(RunError):
-        _draw(small_scenario, tmp_path / "out", "units.mechanics.parameters.neo_hooke_log_sign=seed")
+        _draw(small_scenario, tmp_path / "out", "units.mechanics.parameters.neo_hooke_log_sign=as_printed")
     assert _processes(tmp_path / "out") == []
 
 

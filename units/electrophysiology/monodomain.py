@@ -47,13 +47,13 @@ class Conduction:
     mass_matrix: str = parameter(
         "consistent",
         "1",
-        "consistent: waves too fast on coarse meshes; lumped: too slow",
+        "consistent: waves are too fast on coarse meshes; lumped: they are too slow",
         choices=("consistent", "lumped"),
     )
     ionic_current: str = parameter(
         "nodal",
         "1",
-        "nodal: taken at the nodes; quadrature: integrated by a rule of degree 2 (with the consistent mass only)",
+        "nodal: evaluated at the nodes; quadrature: integrated by a rule of degree 2 (with the consistent mass only)",
         choices=("nodal", "quadrature"),
     )
 

@@ -10,8 +10,8 @@ Other passive laws are chosen by `material`, quadratic displacements by `element
 Loose tolerances are dangerous here: resting tissue fires by itself where λ − 1 > 3.3e-5.
 
 How it fails: where no equilibrium is found, not even with the change of the loads cut into 64 steps, the step ends
-with StepFailure. With the energy as the seed prints it (`neo_hooke_log_sign: seed`) the undeformed tissue is not
-stress-free, so that there is no state to start from: the initialisation ends with StepFailure.
+with StepFailure. With the energy as printed in the source document (`neo_hooke_log_sign: as_printed`) the undeformed
+tissue is not stress-free, so that there is no state to start from: the initialisation ends with StepFailure.
 """
 
 from collections.abc import Callable, Iterator
@@ -86,7 +86,7 @@ class Mechanics(Differentiable):
             "reference_stretch",
             Causality.INPUT,
             "1",
-            "stretch at which active stress and active stiffness hold; 0: the unit's own at the begin of the step",
+            "stretch at which active stress and active stiffness apply; 0: the value at the beginning of the step",
             Location.ELEMENT,
             needs="stabilization",
         ),
@@ -176,8 +176,9 @@ class Mechanics(Differentiable):
                 f"the undeformed tissue carries a stress of {stress:.3g} MPa although nothing loads it: the strain "
                 "energy has no stress-free state to start from"
                 + (
-                    ". That is the energy as the seed prints it, with + mu ln J; use neo_hooke_log_sign: stress_free"
-                    if self.parameters(NeoHooke).neo_hooke_log_sign == "seed"
+                    ". That is the energy with + mu ln J, as printed in the source document; use "
+                    "neo_hooke_log_sign: stress_free"
+                    if self.parameters(NeoHooke).neo_hooke_log_sign == "as_printed"
                     else ""
                 )
             )

@@ -242,16 +242,16 @@ def test_inside_it_holds_and_outside_it_fails_on_the_others_and_on_the_heart(
 
 def test_what_is_printed_wrongly_must_fail_and_says_whose_reading_it_is(run: Callable[..., Cells]) -> None:
     coarse = ["scene.mesh_size_mm=6", "run.stop_ms=16"]
-    signs = {"a piece of wall": ["stress_free", "seed"]}
+    signs = {"a piece of wall": ["stress_free", "as_printed"]}
     right = run("as_printed", "gompertz", signs, coarse)
-    printed = run("as_printed", "seed", signs, coarse)
+    printed = run("as_printed", "as_printed", signs, coarse)
     assert right["a piece of wall", "stress_free"].kind == SOUND
-    stressed = right["a piece of wall", "seed"], printed["a piece of wall", "seed"]
+    stressed = right["a piece of wall", "as_printed"], printed["a piece of wall", "as_printed"]
     runs_away = printed["a piece of wall", "stress_free"]
     for cell in (*stressed, runs_away):
         assert cell.kind == UNIT_FAILED
         assert cell.trial is not None
-        assert "as the seed prints it" in cell.trial.reason
+        assert "as printed in the source document" in cell.trial.reason
     assert all("the undeformed tissue carries a stress" in cell.reason for cell in stressed)
     assert "the delay function gives the rate -" in runs_away.reason
 
