@@ -22,7 +22,7 @@ ACTIVATION = "activation_ms"
 _SAME_MS = 1e-6
 
 #: Units of measure as names end in them.
-_UNITS = ("ms", "mV", "mm", "ml", "kPa")
+_UNITS = ("ms", "mV", "mm", "ml", "kPa", "deg")
 
 #: A field of the times of events, which has no value where nothing has happened yet.
 _EVENTS = "_time_ms"

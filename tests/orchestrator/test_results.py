@@ -74,6 +74,10 @@ def test_the_time_series_has_the_columns_of_the_contract_and_a_row_per_step(done
         "lv_volume_ml",
         "rv_volume_ml",
         "apex_uplift_mm",
+        "twist_deg",
+        "radial_strain",
+        "circumferential_strain",
+        "longitudinal_strain",
         "active_stress_mean_kPa",
     ]
     assert rows[:, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 7]
