@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..participants.participant import Values
+from .boundaries import read_boundaries
 from .names import COUPLING, FIELDS, SUMMARY, TIME_SERIES
 
 if TYPE_CHECKING:
@@ -57,6 +58,9 @@ class StoredRun:
     ----------
     mesh:
         The undeformed body; None without fields.h5 and for scenes of other elements.
+    boundaries:
+        The faces of the mesh's named boundaries by their nodes, each of shape (faces, dimension): of a solid triangles
+        whose normals point out of the tissue. Empty where there are none, and for runs of versions that kept none.
     frames_ms:
         Times of the stored frames, shape (frames,).
     columns:
@@ -121,6 +125,14 @@ class StoredRun:
     def points_mm(self) -> Values | None:
         """The undeformed nodes of any scene, shape (nodes, 3)."""
         return self._read("points_mm")
+
+    @cached_property
+    def boundaries(self) -> dict[str, NDArray[np.int64]]:
+        """See the class."""
+        if not self._fields.exists():
+            return {}
+        with h5py.File(self._fields, "r") as file:
+            return read_boundaries(file)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

@@ -20,11 +20,11 @@ import numpy as np
 from ..arrays import FloatArray
 from ..mesh import Mesh
 from ..mesh.frame import apex_warnings
+from ..mesh.transmural import transmural_direction, wall_distance
 from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Location, Variable, parameter
-from .transmural import transmural_direction, wall_distance
 
 #: Sum of the two wall distances in mm that is zero but for rounding.
 _TOUCHING_MM = 1e-9

@@ -21,7 +21,7 @@ from ..differentiable import Differentiable
 from ..errors import StepFailure
 from ..snapshot import State
 from ..taken import Taken
-from ..variable import Causality, Location, parameter
+from ..variable import Causality, Location, Record, parameter
 from .laws.registry import LAWS, Material
 from .loads.active_stiffness import Stabilization, StretchDependence
 from .loads.active_stress import ActiveShares
@@ -63,7 +63,15 @@ class LocalMechanics(Differentiable):
     name = "local_mechanics"
     memoryless = True
     groups = (Material, *LAWS, ActiveShares, Stabilization, Hold)
-    fields = tuple(replace(variable, depends_on=_FOLLOWS.get(variable.name, ())) for variable in Mechanics.fields)
+    fields = tuple(
+        replace(
+            variable,
+            depends_on=_FOLLOWS.get(variable.name, ()),
+            # There is no wall whose motion were worth a column.
+            record=Record.NOTHING if variable.recorded_with else variable.record,
+        )
+        for variable in Mechanics.fields
+    )
 
     def prepare(self) -> None:
         """Set the equilibrium up."""

@@ -4,7 +4,8 @@
 
 Displacement fixed on `base`, no inertia. Inputs: the active stress at the nodes, where it depends on the stretch its
 stiffness and the stretch it holds at (`loads/active_stiffness`), the pressures in the cavities, and once fibre and
-sheet. Outputs: stretch per element, displacement, the volumes of the cavities, and the apex's uplift.
+sheet. Outputs: stretch per element, displacement, the volumes of the cavities, the apex's uplift, and the twist and
+mean strains of the left ventricle's wall (`wall_motion`).
 Other passive laws are chosen by `material`, quadratic displacements by `element_order`. Source: model.md, Mechanics.
 
 Loose tolerances are dangerous here: resting tissue fires by itself where λ − 1 > 3.3e-5.
@@ -46,6 +47,7 @@ from .solvers.equilibrium import Convergence, Equilibrium
 from .solvers.factored import Factored
 from .solvers.predictor import MEMORY, Predictor
 from .tangent import Tangent
+from .wall_motion import WallMotion, wall_outputs
 
 _MPA_PER_KPA = 1e-3
 _ML_PER_MM3 = 1e-3
@@ -64,6 +66,8 @@ _FOLLOWS_ALL = (
     "fiber",
     "sheet",
 )
+
+_OF_THE_WALL = tuple(variable.name for variable in wall_outputs(_FOLLOWS_ALL))
 
 
 class Mechanics(Differentiable):
@@ -116,6 +120,7 @@ class Mechanics(Differentiable):
                 ("apex_uplift", "mm", "Z displacement of the lowest node"),
             )
         ),
+        *wall_outputs(_FOLLOWS_ALL),
     )
 
     @classmethod
@@ -167,6 +172,7 @@ class Mechanics(Differentiable):
         self._predictor = Predictor(self._solid.loads, mesh.nodes, float(np.sqrt(mesh.nodes)))
         self._stabilization = self.parameters(Stabilization).stabilization
         self._apex = int(mesh.points[:, 2].argmin())
+        self._wall_motion = WallMotion(mesh, space)
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """The undeformed state, brought to equilibrium with the initial loads."""
@@ -229,7 +235,7 @@ class Mechanics(Differentiable):
         return result
 
     def output(self, name: str, state: State) -> FloatArray:
-        """Stretch (elements,), displacement (nodes, 3) in mm, volumes in ml and uplift in mm (both scalars)."""
+        """Stretch (elements,), displacement (nodes, 3) in mm, volumes in ml, uplift in mm and more scalars."""
         displacement = state["displacement"]
         if name == "displacement":
             return displacement[: self.mesh.nodes]
@@ -237,6 +243,8 @@ class Mechanics(Differentiable):
             return frozen(self._solid.stretch(displacement))
         if name == "apex_uplift":
             return frozen(displacement[self._apex, 2])
+        if name in _OF_THE_WALL:
+            return frozen(self._wall_motion.value(name, displacement))
         if name not in self._cavities:
             return frozen(0.0)
         return frozen(_ML_PER_MM3 * self._cavities[name].volume(displacement))
@@ -263,6 +271,8 @@ class Mechanics(Differentiable):
         }
         # A pressure of 1 MPa has the potential −V.
         matrices |= {name: csr_matrix(-_ML_PER_MM3 * force) for name, force in zip(self._cavities, forces, strict=True)}
+        for name in _OF_THE_WALL:
+            matrices[name] = csr_matrix(at_nodes.T @ self._wall_motion.gradient(name, displacement).ravel())
         absent = _PRESSURES.keys() - self._cavities.keys()
         matrices |= {name: csr_matrix((1, solid.unknowns)) for name in absent}
         return MechanicsDerivative(

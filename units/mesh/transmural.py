@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray
 from ..conjugate_gradients import conjugate_gradients
 from ..errors import InvalidInput
-from ..mesh import Mesh
-from ..mesh.finite_elements import diffusion_matrices, shape_gradients
-from ..mesh.sparsity import Pattern
+from .finite_elements import diffusion_matrices, shape_gradients
+from .simplices import Mesh
+from .sparsity import Pattern
 
 #: Gradient of the wall coordinate, relative to the largest, below which an element counts as having none.
 _FLAT = 1e-10
