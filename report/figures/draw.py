@@ -85,6 +85,7 @@ def _picture(figure: Figure, heading: str) -> bytes:
     FigureCanvasAgg(figure)
     lines = textwrap.fill(heading, int(_LETTERS_PER_INCH * figure.get_figwidth()))
     figure.suptitle(lines, fontsize=11, x=0.01, ha="left")
+    figure.align_ylabels()
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=_DOTS_PER_INCH)
     return content.getvalue()
