@@ -28,7 +28,7 @@ def test_parameters_have_the_values_of_the_page() -> None:
 
 def test_readings_as_printed_are_options_and_not_the_defaults() -> None:
     section = _TEXT.split("## 7.")[1].split("## 8.")[0]
-    options = re.findall(r"\| `(\w+): (\w+)` \|", section)
+    options = re.findall(r"`(\w+): (\w+)`", section)
     assert len(options) == 4
     for name, value in options:
         (found,) = [
