@@ -57,7 +57,7 @@ def test_small_scenes_run_through_fmus_with_the_same_bits(name: str, tmp_path: P
     assert series[0] == series[1]
 
 
-# --- the numbers of model.md, computed independently --------------------------------------------------------------
+# --- the numbers of docs/model.md, computed independently -------------------------------------------------------------
 
 
 def test_the_cells_action_potential(tmp_path: Path) -> None:
