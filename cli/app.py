@@ -8,7 +8,14 @@ import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
-from . import scenario_commands, schema_command, study_commands, verify_command, version
+from . import (
+    comparison_commands,
+    scenario_commands,
+    schema_command,
+    study_commands,
+    verify_command,
+    version,
+)
 from .exit_codes import INPUT_WRONG, RUN_FAILED
 
 
@@ -32,6 +39,8 @@ for command in (
     study_commands.errors,
     study_commands.stability,
     study_commands.tune,
+    comparison_commands.sweep,
+    comparison_commands.compare,
     verify_command.verify,
     schema_command.schema,
 ):

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from ..orchestrator.errors import InputError, Interrupted
-from ..orchestrator.scenario import Scenario
+from ..orchestrator.scenario import Scenario, parsed_assignments
 from .exit_codes import INTERRUPTED
 from .manner import Manner, Quiet, Verbose
 from .scenario_file import Assignments, ScenarioFile, about, opened, variants
@@ -37,7 +37,10 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue from the last checkpoint in the results folder, if there is one.")
     ] = False,
-    figures: Annotated[bool, typer.Option(help="Draw figures when the run is done.")] = True,
+    figures: Annotated[bool, typer.Option(help="Draw figures when the run has ended.")] = True,
+    report: Annotated[
+        bool, typer.Option(help="Write the report, report.html, a page to open in a browser, when the run has ended.")
+    ] = True,
     error_budget: Annotated[
         bool,
         typer.Option(
@@ -48,9 +51,11 @@ def run(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run a scenario, and write its time series, fields, coupling log, summary and figures."""
+    """Run a scenario, and write its time series, fields, coupling log, summary, figures and report."""
     # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
+    from ..orchestrator.results.request import Request
     from ..orchestrator.run import run_scenario
+    from ..report.presentation import FIGURES, PAGE, Presentation
 
     manner = Manner(quiet, verbose)
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
@@ -58,8 +63,11 @@ def run(
         folder = output if output is not None else _default_folder(scenario, resume, manner)
         with about(file):
             try:
+                request = Request(str(file), parsed_assignments(overrides))
+                parts = tuple(part for part, wanted in ((FIGURES, figures), (PAGE, report)) if wanted)
+                shown = Presentation(folder, scenario.name, request.settings, parts) if parts else None
                 outcome = run_scenario(
-                    scenario, base, folder, manner.console, fmu_dir, resume, figures, progress=not quiet
+                    scenario, base, folder, manner.console, fmu_dir, resume, shown, request, progress=not quiet
                 )
             except Interrupted as error:
                 rest = "; continue with --resume" if error.resumable else "; no checkpoint was kept to continue from"

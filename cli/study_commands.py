@@ -57,12 +57,12 @@ def chart(
     from ..studies.chart import chart_study, write_chart
     from ..studies.plan import plan_study
 
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     manner = Manner(quiet, verbose)
     plan = plan_study(file, assignments or [])
     folder = output or Path("results") / plan.study.name
     console = manner.progress_console
-    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         charted = chart_study(plan, bench)
         with console.status("drawing the chart"):
             write_chart(charted, folder)
@@ -91,12 +91,12 @@ def stability(
     from ..studies.stability import map_study, plan_map, write_map
     from ..studies.stability.counts import summary
 
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     manner = Manner(quiet, verbose)
     plan = plan_map(file, assignments or [])
     folder = output or Path("results") / plan.study.name
     console = manner.progress_console
-    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         mapped = map_study(plan, bench)
         with console.status("drawing the map"):
             write_map(mapped, folder)
@@ -146,7 +146,7 @@ def tune(
     from ..studies.plan import plan_study
     from ..studies.tuning import parsed_tolerances, summary, tune_scenario, tune_study, write_tuning
 
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     manner = Manner(quiet, verbose)
     limits = parsed_tolerances(tolerances or [])
     if file.suffix.lower() == ".ssp":
@@ -157,7 +157,7 @@ def tune(
     name = load_scenario(file, assignments or []).name
     folder = output or Path("results") / (f"{name}.tune" if plan is None else plan.study.name)
     console = manner.progress_console
-    with _resumable(folder), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), Bench(folder, console, workers, scheduler) as bench:
         if plan is None:
             tuning = tune_scenario(file, limits, bench, assignments or [], mesh)
         else:
@@ -188,7 +188,7 @@ def errors(
     The scenario is run as it is, and again with one source of error refined at a time: communication step, internal
     steps, meshes and tolerances. The same command continues a budget that was interrupted.
     """
-    _one_of(workers, scheduler)
+    one_of(workers, scheduler)
     manner = Manner(quiet, verbose)
     with opened(file, assignments or []) as (scenario, base):
         folder = output or Path("results") / f"{scenario.name}.errors"
@@ -219,7 +219,7 @@ def _budget(
     # What is wrong with it is said with the file in front.
     variants.scenario({})
     console = manner.progress_console
-    with _resumable(folder), about(file), Bench(folder, console, workers, scheduler) as bench:
+    with resumable(folder), about(file), Bench(folder, console, workers, scheduler) as bench:
         budget = error_budget(variants, bench, known)
         with console.status("drawing the budget"):
             write_budget(budget, folder)
@@ -229,7 +229,8 @@ def _budget(
         manner.say(f"  {text}")
 
 
-def _one_of(workers: int | None, scheduler: str | None) -> None:
+def one_of(workers: int | None, scheduler: str | None) -> None:
+    """InputError where both are given."""
     if workers is not None and scheduler is not None:
         raise InputError(
             "--workers starts processes on this machine, --scheduler uses those of a cluster; give one of the two"
@@ -237,7 +238,7 @@ def _one_of(workers: int | None, scheduler: str | None) -> None:
 
 
 @contextmanager
-def _resumable(folder: Path) -> Iterator[None]:
+def resumable(folder: Path) -> Iterator[None]:
     """Say how to go on with a study that a signal stopped."""
     try:
         yield

@@ -70,7 +70,7 @@ def test_files_are_completed_by_their_endings_and_through_folders(
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "build", "show", "chart", "errors", "stability", "tune", "verify", "schema"]
+    "command", ["run", "build", "show", "chart", "errors", "stability", "tune", "verify", "schema", "sweep", "compare"]
 )
 def test_every_command_and_each_of_its_options_is_described(command: str) -> None:
     from cardiac_cosim.cli.app import app

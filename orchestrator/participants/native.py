@@ -235,7 +235,7 @@ def unit_ports(unit: str, mesh: Mesh, parameters: Parameters) -> tuple[Ports, Po
             variable.location.value,
             variable.fixed,
             variable.needs is None or bool(given[variable.needs]),
-            variable.record.value,
+            variable.recorded_on(mesh).value,
             variable.needs,
             variable.source.name if isinstance(variable, Statistic) else None,
             stand_in=variable.stand_in,

@@ -13,7 +13,7 @@ from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.util import load_yaml_guess_indent
 
 from ..untrusted.yaml_text import parse_yaml
-from .file import scenario_content, validated, with_settings
+from .file import replaced, scenario_content, validated, with_settings
 from .model import Scenario
 
 #: Columns that a line may have: those of the file are not to be broken.
@@ -33,7 +33,8 @@ def rewritten(file: Path, settings: Mapping[str, Any], folder: Path) -> str:
     wanted = validated(with_settings(own, settings), Scenario, str(file))
     changes = _needed(own, settings, wanted) | _paths(wanted, file.parent, folder)
     content = with_settings(own, changes)
-    text = _with(_from_folder(file.read_text(encoding="utf-8"), file.parent, folder), changes)
+    own_text = _from_folder(file.read_text(encoding="utf-8"), file.parent, folder)
+    text = _with(own_text, dict.fromkeys(replaced(changes)) | changes)
     if _same(text, content, file):
         return text
     return _dumped(YAML(), content)

@@ -98,6 +98,17 @@ def test_a_section_that_stands_for_two_is_changed_in_one_place(file: Path) -> No
     assert tuned.units["second"].parameters == {"k": 1}
 
 
+def test_a_mesh_in_place_of_a_geometry_leaves_no_geometry_in_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "scenarios" / "two.yaml"
+    path.parent.mkdir()
+    path.write_text("# A slab.\nname: a\nscene: {geometry: slab, mesh_size_mm: 3}\nunits: {m: {unit: mechanics}}\n")
+    text, written = _written(path, {"scene.mesh": "own.msh"})
+    assert text.splitlines()[0] == "# A slab."
+    scene = load_scenario(written).scene
+    assert scene is not None
+    assert (scene.geometry, scene.mesh) == (None, "../../scenarios/own.msh")
+
+
 def test_a_setting_that_is_not_valid_is_refused(file: Path) -> None:
     with pytest.raises(InputError, match="step"):
         rewritten(file, {"coupling.step_ms": 7.0}, file.parent)

@@ -22,7 +22,7 @@ def _stretch(started: Any, tension: float, **parameters: Any) -> tuple[float, np
 def test_free_contraction_is_that_of_a_cube_of_finite_elements(
     tension: float, along: float, across: float, started: Any
 ) -> None:
-    # Computed independently (model.md, Numbers), and what test_mechanics finds with tetrahedra.
+    # Computed independently (docs/model.md, Numbers), and what test_mechanics finds with tetrahedra.
     stretch, all_three = _stretch(started, tension)
     np.testing.assert_allclose(all_three, [along, across, across], atol=1e-5)
     assert stretch == all_three[0]
