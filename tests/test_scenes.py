@@ -97,10 +97,10 @@ def test_the_sheets_wave_is_faster_along_the_fibres(tmp_path: Path) -> None:
     # At equal distances, which is what its plot shows: the speed of a plane wave is 0.5717 mm/ms along the fibres and
     # by the square root of 1.1 less across; a front that is curved outward is slower than a plane one.
     times = summary["activation_time_ms"]
-    speeds = {way: 10.0 / (times[f"{way}_far"] - times[f"{way}_near"]) for way in ("along", "across")}
+    speeds = {way: 8.0 / (times[f"{way}_far"] - times[f"{way}_near"]) for way in ("along", "across")}
     assert times["along_near"] < times["across_near"] - 0.5
     assert times["along_far"] < times["across_far"] - 1.0
-    assert speeds["along"] / speeds["across"] == pytest.approx(np.sqrt(1.1), rel=0.015)
+    assert speeds["along"] / speeds["across"] == pytest.approx(np.sqrt(1.1), rel=0.01)
     for way, plane in (("along", 0.5717), ("across", 0.5717 / np.sqrt(1.1))):
         assert 0.9 * plane < speeds[way] < plane, way
     with h5py.File(tmp_path / "sheet" / "fields.h5") as file:
