@@ -189,7 +189,7 @@ def test_a_loops_gain_decides_and_not_the_step_until_it_is_iterated(step_ms: flo
 def test_identical_cells_in_a_row_are_one_cell(name: str, tmp_path: Path) -> None:
     everywhere = ("stimulus_x_min_mm=-1", "stimulus_x_max_mm=100", "stimulus_half_width_mm=100")
     sets = [f"units.electrophysiology.parameters.{setting}" for setting in everywhere]
-    common = ("run.stop_ms=50", "coupling.step_ms=5")
+    common = ("run.stop_ms=50", "coupling.step_ms=5", "output.every_ms=5")
     cell, _ = _run("cell", tmp_path, *common)
     many, _ = _run(name, tmp_path, *common, "scene.mesh_size_mm=6", *sets)
     columns = [column for column in many.dtype.names or () if column.startswith("potential_")]
