@@ -170,9 +170,9 @@ def strokes(view: View, lines: Values, rgb: Values, width_mm: float, lift_mm: fl
     return Painted(np.concatenate([first, second]), np.concatenate([rgb, rgb]))
 
 
-def pen(view: View, lines: Values, size_mm: float) -> Painted:
-    """Lines of shape (lines, 2, 3) in mm that mark the edges of a body of the given size."""
-    return strokes(view, lines, np.full((len(lines), 3), 0.2), size_mm / 330, size_mm / 50)
+def pen(view: View, lines: Values, size_mm: float, grey: float = 0.2) -> Painted:
+    """Lines of shape (lines, 2, 3) in mm that mark the edges of a body of this size; `grey` is their brightness."""
+    return strokes(view, lines, np.full((len(lines), 3), grey), size_mm / 330, size_mm / 50)
 
 
 def show(axis: Axes, view: View, layers: Sequence[Sequence[Painted]], window: Window) -> None:

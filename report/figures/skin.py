@@ -14,6 +14,9 @@ from .surface import Numbers, divided, normals, section, sharp_edges, smoothing,
 # Width of lines of equal value, and how far they are lifted off what they lie on, relative to the size of the body.
 _LINE, _LIFT = 1 / 300, 1 / 50
 
+# Brightness of edges that must be seen on dark colours too.
+_ON_DARK = 0.5
+
 
 def evenly(*rgb: tuple[float, float, float]) -> ScalarMappable:
     """The colours of the numbers 0, 1, 2 and so on: of parts that are only told apart."""
@@ -82,9 +85,13 @@ class Skin:
         at_corners = values[self.faces] if values.ndim == 1 else values
         return shaded(view, corners, at_corners, self.corner_normals(points), colors, white, levels)
 
-    def edges(self, view: View, points: Values | None = None) -> Painted:
-        """The sharp edges; `points` are where the nodes have moved to, in mm."""
-        return pen(view, (self.mesh.points if points is None else points)[self._edges], self.size_mm)
+    def edges(self, view: View, points: Values | None = None, *, on_dark: bool = False) -> Painted:
+        """The sharp edges; `points` are where the nodes have moved to, in mm.
+
+        With `on_dark` they are seen on the dark end of a colour bar as well as on the bright one.
+        """
+        lines = (self.mesh.points if points is None else points)[self._edges]
+        return pen(view, lines, self.size_mm, *([_ON_DARK] if on_dark else []))
 
     def cut(
         self, view: View, values: Values, colors: ScalarMappable, levels: Sequence[float] = ()

@@ -65,7 +65,7 @@ def solid_snapshots(run: StoredRun, mesh: Body, shown: FieldOfFrames) -> Figure:
         len(shown.frames), COLUMNS, window.aspect, title_lines=lines, below_in=BAR_IN + 0.25 * deforms, square=True
     )
     for axis, title, points, values in zip(array.axes, shown.titles, places, shown.values, strict=True):
-        body = [skin.painted(TILTED, values, colors, points=points), skin.edges(TILTED, points)]
+        body = [skin.painted(TILTED, values, colors, points=points), skin.edges(TILTED, points, on_dark=True)]
         show(axis, TILTED, [*ghost, body], window)
         axis.set_title(title, fontsize=TEXT_PT)
     add_scale_bar(array.axes[0], TILTED, window)

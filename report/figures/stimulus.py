@@ -31,7 +31,7 @@ def stimulus(run: StoredRun) -> Figure | None:
     windows = [window.as_large_as(windows) for window in windows]
     shown = panels(2, 2, windows[0].aspect, below_in=BAR_IN + 0.2)
     for axis, (title, view), window in zip(shown.axes, scenes.items(), windows, strict=True):
-        show(axis, view, [[skin.painted(view, potential, colors), skin.edges(view)]], window)
+        show(axis, view, [[skin.painted(view, potential, colors), skin.edges(view, on_dark=True)]], window)
         axis.set_title(title, fontsize=TITLE_PT)
     first, last = mesh.points[excited].min(axis=0), mesh.points[excited].max(axis=0)
     # Straight down, what is right and up on the picture is X and Y.
