@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..participants.participant import Values
-from .names import COUPLING, FIELDS, ITERATIONS, SUMMARY, TIME_SERIES
+from .boundaries import read_boundaries
+from .names import COUPLING, FIELDS, SUMMARY, TIME_SERIES
 
 if TYPE_CHECKING:
     import pandas
@@ -57,6 +58,9 @@ class StoredRun:
     ----------
     mesh:
         The undeformed body; None without fields.h5 and for scenes of other elements.
+    boundaries:
+        The faces of the mesh's named boundaries by their nodes, each of shape (faces, dimension): of a solid triangles
+        whose normals point out of the tissue. Empty where there are none, and for runs of versions that kept none.
     frames_ms:
         Times of the stored frames, shape (frames,).
     columns:
@@ -85,14 +89,6 @@ class StoredRun:
         settings = request.get("settings") if isinstance(request, dict) else None
         return settings if isinstance(settings, dict) else {}
 
-    def iterations(self) -> dict[str, Values]:
-        """The columns of iterations.csv, a row per sweep of an iterated step; empty where there is none."""
-        return _numbers(self.folder / ITERATIONS)
-
-    def coupling_columns(self) -> dict[str, Values]:
-        """The numbers of the coupling log by column, without a data frame; empty where there is none."""
-        return _numbers(self.folder / COUPLING)
-
     def time_series(self) -> "pandas.DataFrame":
         """The time series as a data frame, texts included, indexed by `time_ms`; empty where there is none."""
         return _frame(self.folder / TIME_SERIES)
@@ -102,13 +98,18 @@ class StoredRun:
         return _frame(self.folder / COUPLING)
 
     @cached_property
+    def cells(self) -> NDArray[np.int64] | None:
+        """The nodes of the elements of any scene, shape (elements, dimension + 1)."""
+        cells = self._read("cells")
+        return None if cells is None else cells.astype(np.int64)
+
+    @cached_property
     def mesh(self) -> Body | None:
         """See the class."""
-        points, cells = self._read("points_mm"), self._read("cells")
-        # The figures in space are of solids.
+        points, cells = self.points_mm, self.cells
         if points is None or cells is None or cells.shape[1] != 4:
             return None
-        return Body(points, cells.astype(np.int64))
+        return Body(points, cells)
 
     @cached_property
     def frames_ms(self) -> Values:
@@ -121,16 +122,22 @@ class StoredRun:
         """See the class."""
         return _numbers(self.folder / TIME_SERIES)
 
+    def numbers(self, name: str) -> dict[str, Values]:
+        """The columns of numbers of another table in the folder, as `columns`; empty where there is none."""
+        return _numbers(self.folder / name)
+
     @cached_property
     def points_mm(self) -> Values | None:
         """The undeformed nodes of any scene, shape (nodes, 3)."""
         return self._read("points_mm")
 
     @cached_property
-    def cells(self) -> NDArray[np.int64] | None:
-        """The elements of any scene by their nodes: points to tetrahedra, shape (elements, 1 to 4)."""
-        cells = self._read("cells")
-        return None if cells is None else cells.astype(np.int64)
+    def boundaries(self) -> dict[str, NDArray[np.int64]]:
+        """See the class."""
+        if not self._fields.exists():
+            return {}
+        with h5py.File(self._fields, "r") as file:
+            return read_boundaries(file)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

@@ -4,7 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...orchestrator.results.stored_run import StoredRun
-from ...studies.pictures.colors import COLORS
+from .cavity_volumes import chamber
+from .plot_axes import color, curve, key, label, panels
 
 _VOLUME, _PRESSURE = "_volume_ml", "_pressure_kPa"
 
@@ -19,20 +20,13 @@ def pressure_volume(run: StoredRun) -> Figure | None:
             continue
         known = np.isfinite(volumes) & np.isfinite(pressures)
         if known.any() and np.ptp(pressures[known]) > 0.0 and (volumes[known] > 0.0).all():
-            curves[cavity.upper().replace("_", " ")] = volumes[known], pressures[known]
+            curves[cavity] = volumes[known], pressures[known]
     if not curves:
         return None
-    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
-    axis = figure.subplots()
+    figure, (axis,) = panels(1, 4.2)
     for number, (cavity, (volumes, pressures)) in enumerate(curves.items()):
-        color = COLORS[number % len(COLORS)]
-        axis.plot(volumes, pressures, color=color, linewidth=2.0, label=cavity)
-        axis.plot(volumes[0], pressures[0], "o", color=color)
-    axis.set_xlabel("cavity volume (ml)", fontsize=12)
-    axis.set_ylabel("cavity pressure (kPa)", fontsize=12)
-    axis.tick_params(labelsize=11)
-    axis.grid(color="0.9")
-    axis.set_axisbelow(True)
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.legend(title="cavity", fontsize=11, title_fontsize=11, frameon=False, loc="upper left")
+        curve(axis, number, volumes, pressures, f"{chamber(cavity)}; the dot is the beginning")
+        axis.plot(volumes[0], pressures[0], "o", color=color(number))
+    label(axis, "cavity volume (ml)", "cavity pressure (kPa)")
+    key(axis, 1)
     return figure

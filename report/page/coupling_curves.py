@@ -5,13 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...orchestrator.participants.participant import Values
+from ...orchestrator.results.names import COUPLING, ITERATIONS
 from ...orchestrator.results.stored_run import StoredRun
 from .panels import MOST_CURVES, Curve, Panel
 
 
 def coupling_curves(run: StoredRun) -> list[Panel]:
     """All that there is something to see of."""
-    log, sweeps = run.coupling_columns(), run.iterations()
+    log, sweeps = run.numbers(COUPLING), run.numbers(ITERATIONS)
     time = log.get("time_ms")
     found: list[Panel] = []
     if _varies(log, "step_ms"):
@@ -54,7 +55,7 @@ def coupling_curves(run: StoredRun) -> list[Panel]:
 
 def constants(run: StoredRun) -> list[str]:
     """Sentences on what is the same in every step, and therefore no curve."""
-    log = run.coupling_columns()
+    log = run.numbers(COUPLING)
     if not len(log.get("time_ms", ())):
         return []
     found = []

@@ -33,7 +33,14 @@ def _run(scenario: Path, out: Path, *sets: str, resume: bool = False) -> dict[st
 
 def _command(scenario: Path, out: Path, *sets: str) -> list[str]:
     command = [sys.executable, "-m", "cardiac_cosim.cli", "run", str(scenario), "--output", str(out)]
-    return [*command, "--no-figures", "--fmu-dir", str(scenario.parent), *(p for text in sets for p in ("--set", text))]
+    return [
+        *command,
+        "--no-figures",
+        "--no-report",
+        "--fmu-dir",
+        str(scenario.parent),
+        *(p for text in sets for p in ("--set", text)),
+    ]
 
 
 def _content(out: Path) -> dict[str, Any]:
@@ -108,7 +115,7 @@ def test_stopped_by_a_signal_it_goes_on_from_that_very_step(number: int, small_s
     process.send_signal(number)
     _, message = process.communicate(timeout=120)
     assert process.returncode == 128 + number
-    assert "to be continued with --resume" in message
+    assert "continue with --resume" in message
     # Without the header and the initial state.
     reached = _rows(out) - 2
     assert 4 <= reached < 40

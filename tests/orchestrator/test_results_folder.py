@@ -124,7 +124,7 @@ def test_of_two_runs_at_once_one_runs_and_the_other_is_told_by_whom(small_scenar
     out = tmp_path / "out"
     runs = [
         subprocess.Popen(
-            [*_COMMAND, *_arguments(small_scenario, out, "--no-figures", "--set", "run.stop_ms=15")],
+            [*_COMMAND, *_arguments(small_scenario, out, "--no-figures", "--no-report", "--set", "run.stop_ms=15")],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -498,7 +498,7 @@ def test_a_file_that_cannot_be_closed_neither_loses_the_summary_nor_hides_the_ph
 
     monkeypatch.setattr(Fields, "close", refuse)
     with pytest.raises(RunError, match=r"unit 'active_stress' failed in the step.*besides") as caught:
-        _run(small_scenario, tmp_path / "out", "units.active_stress.parameters.delay_function=seed")
+        _run(small_scenario, tmp_path / "out", "units.active_stress.parameters.delay_function=as_printed")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (summary["status"], summary["message"]) == ("failed", str(caught.value))
     # The frames are what is left of the fields then.
@@ -549,7 +549,7 @@ def test_where_no_more_can_be_written_the_run_ends_with_3_and_goes_on_when_it_ca
 ) -> None:
     out = tmp_path / "out"
     ended = subprocess.run(
-        [*_COMMAND, *_arguments(small_scenario, out, "--no-figures")],
+        [*_COMMAND, *_arguments(small_scenario, out, "--no-figures", "--no-report")],
         capture_output=True,
         text=True,
         timeout=120,

@@ -1,9 +1,13 @@
 """A report in a browser, as a test looks at it."""
 
 import re
+import time
 from dataclasses import dataclass, field
 
 from playwright.sync_api import Page
+
+#: Where much else runs, everything takes longer.
+_PATIENCE_S = 120.0
 
 
 @dataclass
@@ -40,4 +44,11 @@ class Look:
 
     def settle(self) -> None:
         """Wait until what was asked for is drawn."""
-        self.page.wait_for_function("document.body.dataset.drawing !== 'yes'")
+        self.until("document.body.dataset.drawing !== 'yes'")
+
+    def until(self, condition: str) -> None:
+        """Wait for a condition in JavaScript; the page's own rules forbid the browser to try it by itself."""
+        until = time.monotonic() + _PATIENCE_S
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < until, condition
+            self.page.wait_for_timeout(20)

@@ -78,17 +78,18 @@ def test_time_is_one_for_body_curves_and_keys(run_of: RunOf, look: LookAt) -> No
 
     # A click in the lowest panel, at 10 ms.
     before = seen.trace(0, "x")
+    seen.page.locator("#curves .nsewdrag").last.scroll_into_view_if_needed()
     box = seen.page.locator("#curves .nsewdrag").last.bounding_box()
     assert box is not None
     seen.page.mouse.click(box["x"] + 10.2 / 40.0 * box["width"], box["y"] + 0.5 * box["height"])
-    seen.page.wait_for_function("document.getElementById('now').textContent === '10 ms'")
+    seen.until("document.getElementById('now').textContent === '10 ms'")
     seen.settle()
     assert seen.cursor_ms == 10.0
     assert seen.trace(0, "x") != before
 
     # And it plays, and pauses.
     seen.page.keyboard.press(" ")
-    seen.page.wait_for_function("Number(document.getElementById('time').value) >= 2")
+    seen.until("Number(document.getElementById('time').value) >= 2")
     assert "Pause" in seen.page.inner_text("#play")
     seen.page.click("#play")
     seen.settle()
@@ -189,7 +190,7 @@ def test_residuals_of_every_sweep_are_shown(run_of: RunOf, look: LookAt) -> None
         f"{figure}._fullData.filter((trace) => trace.yaxis === 'y{place + 1 if place else ''}')"
         ".map((trace) => Array.from(trace.y).filter(Number.isFinite))"
     )
-    log = run.iterations()
+    log = run.numbers("iterations.csv")
     assert len(log["iteration"]) > 8
     assert drawn == [log["residual_mechanics.stretch"].tolist()]
 

@@ -88,6 +88,8 @@ def test_every_panel_names_its_unit_of_measure(run_of: RunOf) -> None:
         "transmembrane potential (mV)",
         "cavity volume (ml)",
         "apex uplift (mm)",
+        "twist (°)",
+        "strain (dimensionless)",
         "mean active stress (kPa)",
     ]
 

@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray
 from ..conjugate_gradients import conjugate_gradients
 from ..errors import InvalidInput
-from ..mesh import Mesh
-from ..mesh.finite_elements import diffusion_matrices, shape_gradients
-from ..mesh.sparsity import Pattern
+from .finite_elements import diffusion_matrices, shape_gradients
+from .simplices import Mesh
+from .sparsity import Pattern
 
 #: Gradient of the wall coordinate, relative to the largest, below which an element counts as having none.
 _FLAT = 1e-10
@@ -30,7 +30,7 @@ def transmural_direction(mesh: Mesh, endocardium: tuple[str, ...], epicardium: t
     """s₀ = −∇w/|∇w| per element, shape (elements, 3); w is harmonic, 1 on the endocardium, 0 on the epicardium.
 
     A node on both counts as epicardial. Elements without a gradient (all their nodes on one surface) take the mean
-    of their neighbours (model.md, Fibre generator, 1). Raises InvalidInput if some have no neighbour that
+    of their neighbours (docs/model.md, Fibre generator, 1). Raises InvalidInput if some have no neighbour that
     has one.
     """
     w = np.zeros(mesh.nodes)
