@@ -57,9 +57,10 @@ def _kind(stem: str) -> str:
 
 
 def _short(names: Sequence[str]) -> list[str]:
-    """The names of the curves of a panel, without the words that all begin with."""
+    """The names of the curves of a panel, without the words that all begin and end with."""
     words = [spoken(name).split() for name in names]
-    same = 0
-    while len(names) > 1 and all(len(each) > same + 1 and each[same] == words[0][same] for each in words):
-        same += 1
-    return [" ".join(each[same:]) for each in words]
+    for place in (0, -1):
+        while len(names) > 1 and all(len(each) > 1 and each[place] == words[0][place] for each in words):
+            for each in words:
+                del each[place]
+    return [" ".join(each) for each in words]
