@@ -1,4 +1,4 @@
-"""Writes docs/units.md, the tables of every unit's variables, from the units' own declarations."""
+"""The page docs/units.md: tables of every unit's variables, from the units' own declarations."""
 
 from pathlib import Path
 
@@ -32,12 +32,12 @@ _DERIVATIVES = (
     "factorises once per state, and only if somebody asks."
 )
 
-PAGE = Path(__file__).parent / "units.md"
+PAGE = Path(__file__).parents[1] / "units.md"
 
 
 def page() -> str:
-    """The text of docs/units.md."""
-    origin = "Written by `python docs/unit_tables.py` from the declarations in `units/`."
+    """Its text."""
+    origin = "Written by `python docs/generate` from the declarations in `units/`."
     told = " and ".join(f"`{item.name}`, {item.description}" for item in (IMPLEMENTATION, FALLBACKS))
     both = f"Every unit has two texts besides, calculated parameters in FMI, once it is initialised: {told}."
     marked = (
@@ -78,7 +78,3 @@ def _accuracy(variable: Variable) -> str:
     if variable.refines is None:
         return ""
     return f" (**accuracy**, {variable.refines.value}: {_REFINED_BY[variable.refines]} makes the error smaller)"
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
