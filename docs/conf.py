@@ -30,7 +30,6 @@ external_toc_path = "docs/navigation.yml"
 myst_enable_extensions = ["dollarmath"]
 # Anchors as code hosts make them; a link to one that is not there is a warning, and ends the build of the test.
 myst_heading_anchors = 4
-# Not `http:` alone: `localhost:8080` and the like in a link would be taken for a page.
 myst_url_schemes = ["http", "https", "mailto"]
 
 # --- notebooks --------------------------------------------------------------------------------------------------------
@@ -50,5 +49,7 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
 html_show_sphinx = False
+# Excerpts in the search would be fetched, which browsers do not do from files.
+html_show_search_summary = False
 html_copy_source = False
 html_show_sourcelink = False

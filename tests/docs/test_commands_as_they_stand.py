@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from doc_blocks import PAGES, Block, blocks, command_lines, name_of
@@ -30,14 +29,20 @@ def _follows(page: Path) -> bool:
 
 @pytest.mark.parametrize("page", [page for page in PAGES if _follows(page)], ids=name_of)
 def test_commands_do_what_they_are_shown_for(page: Path, project: Path) -> None:
-    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    names: dict[str, Any] = {"__name__": "__main__"}
+    programs: list[str] = []
     for block in blocks(page):
         if block.saved_as is not None:
             (project / block.saved_as).write_text(block.text, encoding="utf-8")
         elif block.language == "python":
-            exec(compile(block.text, str(block), "exec"), names)
+            # With those before it, whose names it may use, in a process of its own, which it may change.
+            programs.append(block.text)
+            _run([sys.executable, "-c", "\n".join(programs)], str(block))
         for line in _commands(block):
             kept = " ".join(word for word in line.split(" ") if word not in EXCEPTIONS)
-            done = subprocess.run(["bash", "-c", kept], env=environment, capture_output=True, text=True, check=False)
-            assert done.returncode == 0, f"{block}: {line}\n{done.stdout}\n{done.stderr}"
+            _run(["bash", "-c", kept], f"{block}: {line}")
+
+
+def _run(command: list[str], told: str) -> None:
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{told}\n{done.stdout}\n{done.stderr}"
