@@ -1,4 +1,4 @@
-"""The heartbeat against the reference's, on the reference's mesh: writes the table in README.md (half a minute)."""
+"""The heartbeat compared with that of the reference, on its mesh: writes the table in README.md (half a minute)."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

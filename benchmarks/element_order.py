@@ -1,4 +1,4 @@
-"""Linear against quadratic displacement on a contracted heart that is refined: writes a table in docs/mechanics.md."""
+"""Linear and quadratic displacement on a contracted heart, on refined meshes: writes a table in docs/mechanics.md."""
 
 from time import process_time
 
@@ -15,7 +15,7 @@ from .refinement import started
 _SIZE_MM = 8.0
 #: The plateau of the active stress.
 _STRESS_KPA = 500.0
-#: Order of the displacement, and levels of refinement.
+#: Polynomial order of the displacement, and levels of refinement.
 _CASES = ((1, 0), (1, 1), (1, 2), (2, 0), (2, 1))
 
 
@@ -24,7 +24,8 @@ def measure() -> str:
     heart = build("biventricle", _SIZE_MM)
     generator = started(FiberGenerator(heart), {}, {})
     rows = [
-        "| displacement | refined | tetrahedra | left volume, ml | right volume, ml | apex uplift, mm | time |",
+        "| displacement | refinements | tetrahedra | left ventricle, ml | right ventricle, ml | apex uplift, mm "
+        "| relative time |",
         "|---|---|---|---|---|---|---|",
     ]
     first = None
@@ -39,7 +40,7 @@ def measure() -> str:
         first = first or took
         left, right, uplift = (float(unit.get(name)) for name in ("lv_volume", "rv_volume", "apex_uplift"))
         found = f"{left:.2f} | {right:.2f} | {uplift:.2f}"
-        rows.append(f"| P{order} | {levels} × | {fine.mesh.elements} | {found} | {took / first:.0f} |")
+        rows.append(f"| P{order} | {levels} | {fine.mesh.elements} | {found} | {took / first:.0f} |")
     return "\n".join(rows)
 
 

@@ -1,6 +1,6 @@
-"""What it costs to hand fields over: 10 000 numbers to and from an FMU, and the three fields of a step of the heart.
+"""The cost of exchanging fields: 10 000 values to and from an FMU, and the three fields of one step of the heart.
 
-Prints a table for FMI 2.0 and FMI 3.0.
+Prints the table of docs/fmi.md for FMI 2.0 and FMI 3.0.
 """
 
 import zipfile
@@ -29,7 +29,7 @@ def _block() -> Mesh:
 
 
 def _milliseconds(fmu: Path) -> tuple[float, float, float]:
-    """Medians of setting and of reading a field, in ms, and the seconds to make the participant."""
+    """Medians of setting and of getting a field, in ms, and the seconds to load the FMU."""
     begin = perf_counter()
     participant = FmuParticipant("active_stress", fmu, {})
     made = perf_counter() - begin
@@ -43,7 +43,7 @@ def _milliseconds(fmu: Path) -> tuple[float, float, float]:
             begin = perf_counter()
             participant.set("potential", potential)
             setting.append(perf_counter() - begin)
-            # Without a step what is read would be what was read before.
+            # Without a step, the values that are read would be those that were read before.
             participant.start(1e-3 * number, 1e-3)
             begin = perf_counter()
             participant.get("active_stress")
@@ -95,8 +95,8 @@ def _row(mesh: Mesh, fmi: int) -> str:
 
 if __name__ == "__main__":
     block = _block()
-    columns = ("set, ms", "get, ms", "a step of the heart, ms", "made in, s", "description, kB")
-    print(f"| {block.nodes} numbers | {' | '.join(columns)} |")
+    columns = ("version", "set, ms", "get, ms", "fields of one heart step, ms", "loaded, s", "description, kB")
+    print(f"| {' | '.join(columns)} |")
     print("|---|---|---|---|---|---|")
     for fmi in (2, 3):
         print(_row(block, fmi))

@@ -1,4 +1,4 @@
-"""The two passive problems of Land et al. 2015 by both elements: writes the tables in docs/mechanics.md (minutes)."""
+"""The two passive problems of Land et al. 2015 with P1 and P2: writes the tables in docs/mechanics.md (minutes)."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,18 +11,20 @@ from .page import write_between
 
 PAGE = Path(__file__).parent.parent / "docs" / "mechanics.md"
 _PENALTIES_MPA = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
-#: Cells across, for each order of the displacement.
+#: Cells across, for each polynomial order of the displacement.
 _BEAMS, _ELLIPSOIDS = {2: (1, 2, 3, 4), 1: (2, 4, 8)}, {2: (1, 2, 3), 1: (2, 4, 6)}
 
 Solve = Callable[[Mesh, int], float]
 
 
 def _table(title: str, make: Callable[[int], Mesh], solve: Solve, cells: dict[int, tuple[int, ...]]) -> list[str]:
-    """Rows of size and answer, how far it is off what the finest P2 says, and at which order it comes.
+    """A row for each mesh: its size, the position, the difference from the finest P2, the observed order of accuracy.
 
-    An order is left out where the answer has passed that of the finest P2, or is as near as P2 itself is known.
+    The order is left out where the position has passed that of the finest P2, or where the difference is not larger
+    than the uncertainty of the finest P2 itself.
     """
-    rows = [f"| {title} | cells across | tetrahedra | mm | off the finest P2 | order |", "|---|---|---|---|---|---|"]
+    results = "position, mm | difference from the finest P2, mm | order of accuracy"
+    rows = [f"| {title} | cells across | tetrahedra | {results} |", "|---|---|---|---|---|---|"]
     finest = known = 0.0
     for order, counts in cells.items():
         meshes = [make(count) for count in counts]
@@ -45,10 +47,10 @@ def measure() -> str:
     penalties = [
         "| κ in MPa | " + " | ".join(f"{bulk:g}" for bulk in _PENALTIES_MPA) + " |",
         "|---" * (len(_PENALTIES_MPA) + 1) + "|",
-        "| tip of the beam in mm (2 cells across) | "
+        "| tip of the beam, mm (P2, 2 cells across) | "
         + " | ".join(f"{tip_mm(beams, 2, bulk):.3f}" for bulk in _PENALTIES_MPA)
         + " |",
-        "| apex of the ellipsoid in mm (1 cell across) | "
+        "| apex of the ellipsoid, mm (P2, 1 cell across) | "
         + " | ".join(f"{apex_mm(ellipsoids, 2, bulk):.3f}" for bulk in _PENALTIES_MPA)
         + " |",
     ]

@@ -1,7 +1,9 @@
 """The two passive problems of Land et al. 2015 (Proc. R. Soc. A 471:20150641) on structured meshes.
 
-Problem 1: a beam of 10 x 1 x 1 mm with fibres along it, fixed at x = 0, under 4 Pa from below, which follow its face.
-Problem 2: half an ellipsoid, isotropic, fixed at its base, under 10 kPa inside. By symmetry a quarter of it is enough.
+Problem 1: a beam of 10 x 1 x 1 mm with fibres along it, fixed at x = 0. A pressure of 4 Pa acts on its lower face and
+follows the face as it deforms.
+Problem 2: half an ellipsoid, isotropic, fixed at its base, under a pressure of 10 kPa inside. Because of the symmetry,
+a quarter of it is computed.
 """
 
 import numpy as np
@@ -18,10 +20,10 @@ from cardiac_cosim.units.mechanics.solvers.factored import Factored
 from cardiac_cosim.units.mesh import Mesh
 from skfem import MeshTet
 
-#: Penalty on changes of volume in MPa; with twice of it the tip moves by 3 μm and the apex by 5 (docs/mechanics.md).
+#: Penalty on changes of volume in MPa; doubling it moves the tip by 3 μm and the apex by 5 μm (docs/mechanics.md).
 BULK_MPA = 0.5
 
-#: Problem 2: the pressure, and the law's numbers.
+#: Problem 2: the pressure, and the parameters of the law.
 ELLIPSOID_LOAD_KPA = 10.0
 ELLIPSOID_LAW = {
     "guccione_stiffness_MPa": 0.01,

@@ -1,4 +1,4 @@
-"""Puts what a benchmark measured between its two markers on a page."""
+"""Writes the results of a benchmark between its two markers on a page."""
 
 from pathlib import Path
 

@@ -1,7 +1,8 @@
-"""Fine electrophysiology inside a coarse heart, against the same on meshes refined as a whole, with inherited fibres.
+"""Electrophysiology refined inside a coarse heart, compared with hearts whose whole mesh is refined.
 
-Prints when the apex is activated: `refine` levels 0 to 2 without feedback, each next to electrophysiology on the
-refined mesh itself; and with feedback, `refine: 1` next to a heart that is refined as a whole, its mechanics too.
+The refined meshes inherit the fibres of the coarse one. The activation time of the apex is printed for two cases.
+Without mechano-electric feedback, `refine` is 0, 1 and 2, and each is compared with electrophysiology on the refined
+mesh itself. With feedback, `refine: 1` is compared with a heart whose whole mesh is refined, for the mechanics too.
 """
 
 from time import perf_counter
@@ -31,7 +32,7 @@ def started(unit: Unit, parameters: dict[str, float], inputs: dict[str, np.ndarr
 
 
 def _beat(mesh: Mesh, directions: dict[str, np.ndarray], parameters: dict[str, float], mechanics: bool) -> np.ndarray:
-    """Activation times in ms of all nodes: Gauss–Seidel, or the wave alone."""
+    """Activation times in ms of all nodes: with `mechanics` coupled by Gauss–Seidel, otherwise of the wave alone."""
     wave = started(Electrophysiology(mesh), parameters, {"fiber": directions["fiber"]})
     tension = started(ActiveStress(mesh), {}, {})
     wall = started(Mechanics(mesh), {}, directions) if mechanics else None
@@ -48,9 +49,9 @@ def _beat(mesh: Mesh, directions: dict[str, np.ndarray], parameters: dict[str, f
 
 
 def _report(what: str, heart: Mesh, times: np.ndarray, since: float) -> None:
-    # The first nodes of a refined mesh are those of the heart.
+    # The first nodes of a refined mesh are those of the coarse one.
     apex = np.linalg.norm(heart.points - _APEX_MM, axis=1).argmin()
-    print(f"{what:62s} apex {times[apex]:7.2f} ms   ({perf_counter() - since:.0f} s)", flush=True)
+    print(f"{what:45s} apex activated at {times[apex]:7.2f} ms   ({perf_counter() - since:.0f} s)", flush=True)
 
 
 if __name__ == "__main__":
@@ -67,7 +68,7 @@ if __name__ == "__main__":
         if level:
             begin = perf_counter()
             outside = _beat(fine.mesh, inherited, quiet, mechanics=False)
-            _report(f"without feedback, all refined {level} times", heart, outside, begin)
+            _report(f"without feedback, whole mesh refined {level} times", heart, outside, begin)
             print(f"  largest difference at a node: {np.abs(inside - outside[: heart.nodes]).max():.1e} ms")
     fine = refined(heart, 1)
     begin = perf_counter()
@@ -76,6 +77,6 @@ if __name__ == "__main__":
     _report("with feedback, refine: 1", heart, _beat(heart, own, {"refine": 1}, mechanics=True), begin)
     begin = perf_counter()
     inherited = {name: values[fine.parents] for name, values in own.items()}
-    _report("with feedback, all refined once", heart, _beat(fine.mesh, inherited, {}, mechanics=True), begin)
+    _report("with feedback, whole mesh refined once", heart, _beat(fine.mesh, inherited, {}, mechanics=True), begin)
     begin = perf_counter()
     _report("with feedback, refine: 2", heart, _beat(heart, own, {"refine": 2}, mechanics=True), begin)

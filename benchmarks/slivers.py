@@ -1,8 +1,9 @@
-"""The meshes of scenarios/stability/slivers*.yaml: a piece of wall of 6 mm with a place that is nearly flat.
+"""The meshes of scenarios/stability/slivers*.yaml: a piece of wall with elements of 6 mm, two of which are nearly flat.
 
-The inner node nearest to the centre is pushed towards the opposite face of one of its tetrahedra. That one becomes
-flat, and with it the one beside it, whose opposite face lies in the same plane. All else stays as it is, so that the
-maps tell what one sliver does to a mesh that is sound without it. `python -m benchmarks.slivers` writes them.
+The inner node nearest to the centre is pushed towards the opposite face of one of its tetrahedra. This tetrahedron
+becomes flat, and so does the one beside it, whose opposite face lies in the same plane. Everything else stays as it is,
+so that the maps show the effect of a single sliver on a mesh that is sound without it. `python -m benchmarks.slivers`
+writes the meshes.
 """
 
 from pathlib import Path
@@ -22,10 +23,10 @@ QUALITIES = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 _SIZE_MM = 6.0
 
-#: As far towards the face as a node may be: qualities below those are no elements.
+#: Largest fraction of the way to the face: beyond it, the quality is that of no valid element.
 _NEARLY = 1.0 - 1e-6
 
-#: How exactly the part of the way is found that the node is pushed.
+#: Tolerance of the fraction of the way by which the node is pushed.
 _TOLERANCE = 1e-14
 
 
@@ -43,7 +44,7 @@ def sliver_mesh(quality: float) -> Mesh:
     def excess(part: float) -> float:
         return float(signed_inverse_condition_number(_pushed(mesh, node, part * way)).min()) - quality
 
-    # Where it reaches the face, the element is flat, and no mesh.
+    # Where the node reaches the face, the element is flat, and the mesh is invalid.
     return _pushed(mesh, node, brentq(excess, 0.0, _NEARLY, xtol=_TOLERANCE) * way)
 
 

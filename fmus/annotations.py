@@ -6,6 +6,7 @@ The element `Unit` stands under VendorAnnotations in FMI 2.0 (FMI 2.0.4, section
 
 from collections.abc import Iterator
 
+from ..units.mesh import Mesh
 from ..units.statistics import Statistic
 from ..units.unit import FALLBACKS as _FALLBACKS
 from ..units.unit import IMPLEMENTATION as _IMPLEMENTATION
@@ -23,16 +24,17 @@ NAMESPACE = f"urn:{TOOL}:fmu"
 IMPLEMENTATION, FALLBACKS = _IMPLEMENTATION.name, _FALLBACKS.name
 
 
-def annotations(unit: type[Unit]) -> Iterator[str]:
-    """The lines of the element `Unit`, with a `Field` for each input and output."""
+def annotations(unit: type[Unit], mesh: Mesh) -> Iterator[str]:
+    """The lines of the element `Unit` on `mesh`, with a `Field` for each input and output."""
     attributes = {"xmlns:own": NAMESPACE, "name": unit.name, "memoryless": str(unit.memoryless).lower()}
     yield tag("own:Unit", end=False, **attributes)
     for variable in unit.variables():
         if variable.causality not in (Causality.INPUT, Causality.OUTPUT):
             continue
         extra = {"needs": variable.needs} if variable.needs else {}
-        if variable.record is not Record.NOTHING:
-            extra["record"] = variable.record.value
+        record = variable.recorded_on(mesh)
+        if record is not Record.NOTHING:
+            extra["record"] = record.value
         if variable.stand_in:
             extra["standIn"] = "true"
         if isinstance(variable, Statistic):

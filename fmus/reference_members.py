@@ -130,11 +130,14 @@ def _document(*lines: str) -> str:
 def _explained(experiment: ReferenceExperiment) -> str:
     given = ", ".join(experiment.inputs) or "none"
     return (
-        f"This FMU holds a reference experiment with its results, in {FOLDER} (FMI-LS-REF).\n\n"
-        f"Parameters are at their defaults, from t = 0 in steps of {experiment.step_s:g} s to "
-        f"{experiment.times_s[-1]:g} s. Inputs that are given, from the initialization on and constant: {given}; of a "
-        "field only the first places differ from the start value. All other inputs keep their start values.\n\n"
-        "The results are those of the unit without FMI on the machine that built this FMU. Another processor changes "
-        f"their last bits; a deviation above {TOLERANCE:g} of the largest value of a variable is an error.\n\n"
-        "To verify: cosim verify FILE.fmu\n"
+        f"This FMU contains a reference experiment with its results, in {FOLDER} (FMI-LS-REF).\n\n"
+        f"The experiment begins at t = 0 and ends at t = {experiment.times_s[-1]:g} s, in steps of "
+        f"{experiment.step_s:g} s. All parameters have their defaults. The following inputs are set at the "
+        "initialisation and stay constant: "
+        f"{given}. Of a field, only the first values differ from the start value. All other inputs keep their start "
+        "values.\n\n"
+        "The results were computed by the unit without FMI on the machine that built this FMU. On another processor, "
+        f"they differ in their last bits. A deviation of more than {TOLERANCE:g} times the largest magnitude of a "
+        "variable is an error.\n\n"
+        "To run the experiment again and compare: cosim verify FILE.fmu\n"
     )

@@ -2,27 +2,28 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from .alarm import Alarm
-from .assembly import assemble, called_directly, checked_mesh
+from .assembly import assemble, checked_mesh
 from .costs import Costs
 from .coupling.master import Observer
-from .drawing import Drawing
 from .errors import InputError, Interrupted, RunError
 from .participants.native import Mesh
-from .progress import ProgressBar
+from .progress import RunProgress
 from .results import implementation
 from .results.folder import ResultsFolder
+from .results.names import SUMMARY
 from .results.origin import Origin
+from .results.request import Request
 from .scenario import Scenario
-from .show import describe
+from .showing import assembled, describe
 from .stopping import StopRequest
 
 #: From a scenario, and the folder that its paths are relative to, to its mesh, if it has one.
@@ -38,6 +39,16 @@ class Outcome:
     warnings: tuple[str, ...] = ()
 
 
+class Companion(AbstractContextManager["Companion"], Observer, Protocol):
+    """What makes something of a run's results while the run goes on, and when it is over (`report.presentation`)."""
+
+    def begin(self) -> None:
+        """All results are there; make what is to be made of them, to be waited for by `finish`."""
+
+    def finish(self) -> tuple[str, ...]:
+        """Wait for what was begun; warnings of what could not be made."""
+
+
 def run_scenario(
     scenario: Scenario,
     base: Path,
@@ -45,14 +56,17 @@ def run_scenario(
     console: Console | None = None,
     fmu_dir: Path | None = None,
     resume: bool = False,
-    figures: bool = False,
+    companion: Companion | None = None,
+    request: Request | None = None,
     mesh_of: MeshOf = checked_mesh,
+    progress: bool = True,
 ) -> Outcome:
     """Run `scenario`, whose paths are relative to `base`, and write the results to `output`.
 
-    Progress goes to `console`; FMUs are taken from `fmu_dir`, or from the user's cache. With `resume` the run goes on
-    from the last checkpoint in `output`, if there is one, and ends as if it had never stopped. `figures` are drawn
-    when it is done. `mesh_of` gives the scenario's mesh: whoever runs many scenarios on one mesh may have kept it.
+    Warnings go to `console`, and so does the `progress`, unless nobody wants to see it. FMUs are taken from `fmu_dir`,
+    or from the user's cache. With `resume` the run goes on from the last checkpoint in `output`, if there is one, and
+    ends as if it had never stopped. The `companion` presents the results, also those up to a failure. `request` is kept
+    in the summary. `mesh_of` gives the scenario's mesh: whoever runs many scenarios on one mesh may have kept it.
 
     Raises
     ------
@@ -66,22 +80,43 @@ def run_scenario(
     """
     started = time.perf_counter()
     console = console or Console(quiet=True)
-    with ResultsFolder(output, Origin.of(scenario, base)) as folder, ExitStack() as stack:
+    request = request or Request()
+    with ResultsFolder(output, Origin.of(scenario, base), request) as folder, ExitStack() as stack:
         # The units' vectors are short: BLAS's threads cost more than they bring, many times as much where several
         # processes share the cores, and the bits of a sum depend on their number.
         stack.enter_context(threadpool_limits(limits=1))
-        drawing = stack.enter_context(Drawing(output)) if figures else None
+        if companion is not None:
+            stack.enter_context(companion)
         summary = folder.complete() if resume else None
         if summary is None:
-            outcome = _run(folder, scenario, base, console, fmu_dir, resume, started, drawing, mesh_of)
+            try:
+                outcome = _run(folder, scenario, base, console, fmu_dir, resume, started, companion, mesh_of, progress)
+            except RunError as error:
+                # What led to the failure is what one wants to look at.
+                if companion is not None and (output / SUMMARY).exists():
+                    companion.begin()
+                    _warn(console, _finished(companion, console, progress, error))
+                raise
         else:
             outcome = Outcome(output, summary)
-            if drawing is not None:
-                drawing.begin()
-        if drawing is None:
+            if companion is not None:
+                companion.begin()
+        if companion is None:
             return outcome
-        with console.status("drawing the figures"):
-            return replace(outcome, warnings=(*outcome.warnings, *drawing.finish()))
+        return replace(outcome, warnings=(*outcome.warnings, *_finished(companion, console, progress)))
+
+
+def _finished(
+    companion: Companion, console: Console, progress: bool, failure: RunError | None = None
+) -> tuple[str, ...]:
+    """The warnings of what was begun; a bug in it does not hide the `failure` of the run."""
+    try:
+        with (console if progress else Console(quiet=True)).status("drawing the results"):
+            return companion.finish()
+    except Exception as error:
+        if failure is None:
+            raise
+        return (str(error),)
 
 
 def _run(
@@ -92,8 +127,9 @@ def _run(
     fmu_dir: Path | None,
     resume: bool,
     started: float,
-    drawing: Drawing | None,
+    companion: Companion | None,
     mesh_of: MeshOf,
+    progress: bool,
 ) -> Outcome:
     before = folder.checkpoint() if resume else None
     mesh = mesh_of(scenario, base)
@@ -124,18 +160,18 @@ def _run(
         _warn(console, implementation.fallbacks(implementations.values()))
         # Nothing in the folder was touched up to here.
         recording = folder.record(assembly, before, costs, implementations)
-        bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
+        bar = RunProgress(console if progress else Console(quiet=True), scenario.name, scenario.run.stop_ms)
         with recording, bar:
             if unready is not None:
                 raise unready
             observers: list[Observer] = [recording, bar, Alarm(master.growth, master.diagnosis, console)]
-            master.run([*observers, drawing] if drawing is not None else observers, stop)
+            master.run([*observers, companion] if companion is not None else observers, stop)
             if stop.signal is not None and not master.done:
                 recording.keep()
                 raise Interrupted(stop.signal)
-        # All results are there; the participants are closed while the figures are drawn.
-        if drawing is not None:
-            drawing.begin()
+        # All results are there; the participants are closed while they are presented.
+        if companion is not None:
+            companion.begin()
     return Outcome(folder.path, recording.summary, tuple(recording.diagnosis))
 
 
@@ -155,7 +191,5 @@ def _about(path: Path) -> Iterator[None]:
 
 def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -> str:
     """What `scenario` builds, exchanges and solves, in words; nothing is computed but the mesh."""
-    mesh = checked_mesh(scenario, base)
-    with ExitStack() as stack:
-        assembly = assemble(stack, called_directly(scenario), base, mesh, fmu_dir, described=True)
+    with assembled(scenario, base, fmu_dir) as assembly:
         return describe(assembly)

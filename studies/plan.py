@@ -116,6 +116,22 @@ class Variants:
         """The same as a point."""
         return Point(self.scenario(settings, where, span), self.file.parent, dict(settings))
 
+    def planned(
+        self, each: Iterable[Settings], common: Mapping[str, Any] | None = None, where: str = ""
+    ) -> list["Planned"]:
+        """A point for each of these settings, `common` to all of them and to none of their names.
+
+        Settings that are valid by themselves and cannot stand together are no point. InputError for all others.
+        """
+        found = []
+        for settings in each:
+            try:
+                point = self.point(dict(common or {}) | settings, where)
+                found.append(Planned(settings, Point(point.scenario, point.base, settings)))
+            except Contradiction as error:
+                found.append(Planned(settings, None, error.problem))
+        return found
+
 
 def load_study(path: Path) -> Study:
     """The study in `path`; InputError names the file, the key and the remedy."""
@@ -183,13 +199,7 @@ def _reference(variants: Variants, path: Path, settings: Settings, span: Span | 
 def planned_points(variants: Variants, line: Line, path: Path) -> list[Planned]:
     """The points of a line of the study in `path`; InputError where none of them can be run."""
     where = f"lines, '{line.name}'"
-    found = []
-    for settings in combinations(line.vary):
-        try:
-            point = variants.point(dict(line.set) | settings, where)
-            found.append(Planned(settings, Point(point.scenario, point.base, settings)))
-        except Contradiction as error:
-            found.append(Planned(settings, None, error.problem))
+    found = variants.planned(combinations(line.vary), line.set, where)
     if all(planned.point is None for planned in found):
         raise InputError(f"{path}: {where}: none of its points can be run, the first because of {found[0].reason}")
     return found

@@ -5,7 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 _ROOT = Path(__file__).parent.parent
-_FLOORS = ("units", "fmus", "orchestrator", "studies", "cli")
+_FLOORS = ("units", "fmus", "orchestrator", "studies", "report", "cli")
 _PROJECT = tomllib.loads((_ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 

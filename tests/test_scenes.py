@@ -57,7 +57,7 @@ def test_small_scenes_run_through_fmus_with_the_same_bits(name: str, tmp_path: P
     assert series[0] == series[1]
 
 
-# --- the numbers of model.md, computed independently --------------------------------------------------------------
+# --- the numbers of docs/model.md, computed independently -------------------------------------------------------------
 
 
 def test_the_cells_action_potential(tmp_path: Path) -> None:
@@ -93,7 +93,16 @@ def test_the_strands_speed_and_what_its_elements_do_to_it(size: float, error: fl
 
 
 def test_the_sheets_wave_is_faster_along_the_fibres(tmp_path: Path) -> None:
-    _run("sheet", tmp_path)
+    _, summary = _run("sheet", tmp_path)
+    # At equal distances, which is what its plot shows: the speed of a plane wave is 0.5717 mm/ms along the fibres and
+    # by the square root of 1.1 less across; a front that is curved outward is slower than a plane one.
+    times = summary["activation_time_ms"]
+    speeds = {way: 8.0 / (times[f"{way}_far"] - times[f"{way}_near"]) for way in ("along", "across")}
+    assert times["along_near"] < times["across_near"] - 0.5
+    assert times["along_far"] < times["across_far"] - 1.0
+    assert speeds["along"] / speeds["across"] == pytest.approx(np.sqrt(1.1), rel=0.01)
+    for way, plane in (("along", 0.5717), ("across", 0.5717 / np.sqrt(1.1))):
+        assert 0.9 * plane < speeds[way] < plane, way
     with h5py.File(tmp_path / "sheet" / "fields.h5") as file:
         points, activation = file["points_mm"][:], file["frames/activation_time_ms"][-1]
 
@@ -104,6 +113,32 @@ def test_the_sheets_wave_is_faster_along_the_fibres(tmp_path: Path) -> None:
     along = slope(0, (np.abs(points[:, 1]) < 1.0) & (points[:, 0] > 25.0) & (points[:, 0] < 50.0))
     across = slope(1, (points[:, 0] < 1.0) & (points[:, 1] > 15.0) & (points[:, 1] < 25.0))
     assert along / across == pytest.approx(np.sqrt(1.1), rel=0.05)
+
+
+def test_the_sheets_probes_are_equally_far_from_the_stimulated_place() -> None:
+    scenario = load_scenario(_SCENARIOS / "sheet.yaml")
+    box = scenario.units["electrophysiology"].parameters
+    probes = {name: np.array(place) for name, place in scenario.output.probes_mm.items()}
+    for which in ("near", "far"):
+        along, across = probes[f"along_{which}"], probes[f"across_{which}"]
+        # Across at the left edge, which mirrors the wave as the axis does along the fibres.
+        assert along[1] == across[0] == 0.0
+        assert along[0] - box["stimulus_x_max_mm"] == across[1] - box["stimulus_half_width_mm"] > 5.0
+
+
+def test_the_left_ventricle_twists_and_shortens_until_its_greatest_contraction(tmp_path: Path) -> None:
+    series, summary = _run("left_ventricle", tmp_path, "scene.mesh_size_mm=12")
+    end = int(series["lv_volume_ml"].argmin())
+    assert 0.0 < series["time_ms"][end] < 0.75 * summary["end_ms"]
+    # Wrung out counterclockwise as seen from its apex, as a healthy heart is; the run begins at rest.
+    assert 5.0 < series["twist_deg"][end] < 10.0
+    assert summary["twist_deg"]["max"] < 1.02 * series["twist_deg"][end]
+    assert -0.2 < series["circumferential_strain"][end] < -0.1
+    assert -0.1 < series["longitudinal_strain"][end] < -0.03
+    assert series["twist_deg"][0] == series["radial_strain"][0] == 0.0
+    # A slab of the same tissue has neither.
+    slab, _ = _run("slab", tmp_path, "run.stop_ms=2")
+    assert "twist_deg" not in (slab.dtype.names or ())
 
 
 def test_the_pressure_volume_curve_of_the_resting_ventricle(tmp_path: Path) -> None:
@@ -154,11 +189,11 @@ def test_a_loops_gain_decides_and_not_the_step_until_it_is_iterated(step_ms: flo
 def test_identical_cells_in_a_row_are_one_cell(name: str, tmp_path: Path) -> None:
     everywhere = ("stimulus_x_min_mm=-1", "stimulus_x_max_mm=100", "stimulus_half_width_mm=100")
     sets = [f"units.electrophysiology.parameters.{setting}" for setting in everywhere]
-    common = ("run.stop_ms=50", "coupling.step_ms=5")
+    common = ("run.stop_ms=50", "coupling.step_ms=5", "output.every_ms=5")
     cell, _ = _run("cell", tmp_path, *common)
     many, _ = _run(name, tmp_path, *common, "scene.mesh_size_mm=6", *sets)
     columns = [column for column in many.dtype.names or () if column.startswith("potential_")]
-    assert len(columns) == 2
+    assert len(columns) == {"strand": 2, "sheet": 4}[name]
     for column in columns:
         np.testing.assert_allclose(many[column], cell["potential_cell_mV"], atol=1e-6)
 

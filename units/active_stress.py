@@ -1,23 +1,26 @@
-"""The active stress unit: the tension that a depolarised cell builds up with a delay, at every node by itself.
+"""The active stress unit: the tension that a depolarised cell builds up with a delay, at every node independently.
 
     ∂s_a/∂t = ε(Φ)(k(Φ − Φ_r) − s_a),   ε = ε₀ + (ε₁ − ε₀) exp(−exp(−ζ(Φ − Φ_t)))
 
-Input: the transmembrane potential, held over a step or ramped; optionally the stretch. Output: s_a in kPa. Source:
-model.md, Active stress; Göktepe & Kuhl 2010, eq. 46. The step is exact for a held potential, of any length; with
-`time_integration: forward_euler` it is s_a + H ε (k(Φ − Φ_r) − s_a) at the potential of its end, which oscillates with
-growing amplitude where ε₁ H > 2 and is there to show that limit.
+The input is the transmembrane potential, held over a step or varying linearly, and optionally the stretch. The output
+is s_a in kPa. Source: docs/model.md, Active stress; Göktepe & Kuhl 2010, eq. 46. For a held potential, the step is
+exact and may have any length. With `time_integration: forward_euler` a step of length H gives
+s_a + H ε (k(Φ − Φ_r) − s_a) with the potential at its end. This oscillates with growing amplitude where
+ε₁ H > 2; the option exists to show that limit.
 
-Ramped, the potential jumps from its value in the last step to that of this one at a moment evenly distributed over the
-step: its mean is the line between the two, and the mean active stress is known in closed form, of second order. The
-line itself, followed by every node, would be as good for a slow potential and worse for a fast one: an upstroke takes
-one millisecond, of which the delay's threshold is reached somewhere in the step, and not always near its end.
+If the potential varies linearly over a step, each node is treated as if its potential jumped from the value at the
+beginning to the value at the end, at a moment that is evenly distributed over the step. The mean potential is then the
+line between the two values. The mean active stress is known in closed form and has second order of accuracy. To let
+every node follow the line itself would be as accurate for a slow potential and less accurate for a fast one: an
+upstroke takes one millisecond, and it passes the threshold of the delay somewhere in the step, not always near its end.
 
-With `length_dependence` η the output is s_a (1 + η(λ − 1)), λ averaged from the elements around a node by volume
-(Frank–Starling). Active stress and mechanics then form an algebraic loop. What a mechanics needs to be stable in it is
-given too: the active stiffness K_a = ∂s_a/∂λ = s_a η, and the stretch at which both hold (Regazzoni & Quarteroni 2021).
+With `length_dependence` η the output is s_a (1 + η(λ − 1)), where λ is averaged by volume over the elements around a
+node (Frank–Starling). Active stress and mechanics then form an algebraic loop. For a stable coupling, the unit also
+provides the active stiffness K_a = ∂s_a/∂λ = s_a η and the stretch at which both apply (Regazzoni & Quarteroni 2021).
 
-How it fails: the delay function as the seed prints it, ε₀ + (ε₀ − ε₁) exp(…), is negative in depolarised tissue, and
-the active stress runs away from its target instead of to it. A relaxation rate that is not positive ends the step.
+How it fails: the delay function as printed in the source document (`delay_function: as_printed`), ε₀ + (ε₀ − ε₁)
+exp(…), is negative in depolarised tissue, so that the active stress moves away from its target instead of towards it. A
+relaxation rate that is not positive ends the step with StepFailure.
 """
 
 from dataclasses import dataclass
@@ -55,15 +58,15 @@ class Tension:
     delay_function: str = parameter(
         "gompertz",
         "1",
-        "gompertz: eps_0 + (eps_1 - eps_0) exp(-exp(..)); seed: eps_0 + (eps_0 - eps_1) exp(-exp(..)), unstable",
-        choices=("gompertz", "seed"),
+        "gompertz: eps_0 + (eps_1 - eps_0) exp(-exp(..)); as_printed: eps_0 + (eps_0 - eps_1) exp(-exp(..)), unstable",
+        choices=("gompertz", "as_printed"),
     )
     length_dependence: float = parameter(0.0, "1", "eta, relative active stress per stretch (Frank-Starling)")
     time_integration: str = parameter(
         "exact",
         "1",
-        "exact: the delay's solution for a held potential, of any step; forward_euler: explicit, unstable where eps_1 "
-        "times the step exceeds 2",
+        "exact: exact solution for a held potential, for any step; forward_euler: explicit, unstable where eps_1 times "
+        "the step exceeds 2",
         choices=("exact", "forward_euler"),
     )
 
@@ -83,7 +86,7 @@ class Tension:
     @property
     def _jump(self) -> float:
         jump = self.fast_rate_per_ms - self.slow_rate_per_ms
-        return -jump if self.delay_function == "seed" else jump
+        return -jump if self.delay_function == "as_printed" else jump
 
     def _exponent(self, potential: FloatArray) -> FloatArray:
         exponent = -self.delay_slope_per_mV * (potential - self.tension_threshold_potential_mV)
@@ -133,7 +136,7 @@ class ActiveStress(Differentiable):
             "reference_stretch",
             Causality.OUTPUT,
             "1",
-            "stretch at which active stress and active stiffness hold; 0 without length dependence",
+            "stretch at which active stress and active stiffness apply; 0 without length dependence",
             Location.ELEMENT,
             depends_on=("stretch",),
             pointwise=True,
@@ -224,8 +227,8 @@ class ActiveStress(Differentiable):
                 f"the delay function gives the rate {rate[node]:.3g}/ms at node {node} (potential "
                 f"{potential[node]:.1f} mV): the active stress would grow without bound, away from its target"
                 + (
-                    ". That is the delay as the seed prints it; use delay_function: gompertz"
-                    if self._tension.delay_function == "seed"
+                    ". That is the delay function as printed in the source document; use delay_function: gompertz"
+                    if self._tension.delay_function == "as_printed"
                     else ""
                 )
             )

@@ -1,13 +1,13 @@
-"""Electrophysiology by arrival times: the eikonal equation says when the wave comes, the cell's pulse follows.
+"""Electrophysiology by arrival times: the eikonal equation gives the arrival of the wave, a cell's pulse follows it.
 
-The outputs of the monodomain unit with Aliev–Panfilov cells, for scenes in which only the arrival matters: nothing is
-solved in a step, which may be as long as one likes. Speed of a plane wave: √(c d/(2β_t)) (1 − 2α), the front's closed
-form for r = 0 (Nagumo; model.md, Numbers); its foot before the crossing of the activation potential is that of the same
-front, and behind it runs the action potential of a single cell.
+The outputs are those of the monodomain unit with Aliev–Panfilov cells. The unit is for scenes in which only the arrival
+of the wave matters: a step solves no equations and may have any length. The speed of a plane wave is √(c d/(2β_t)) (1 −
+2α), the closed form of the front for r = 0 (Nagumo; docs/model.md, Numbers). Before the activation potential is
+crossed, the potential is that of the foot of the same front; afterwards, it is the action potential of a single cell.
 
-How it fails: it knows no curvature, so that small stimuli start a wave too early, and no electrotonic currents. The
-stretch has no influence on it, so it has no such input. On coarse meshes its speed is nearer to that of fine ones than
-the monodomain unit's.
+How it fails: the unit neglects the curvature of the front and electrotonic currents, so that small stimuli start a wave
+too early. The stretch has no influence, and so there is no such input. On coarse meshes, the speed is closer to that of
+fine meshes than the speed of the monodomain unit is.
 """
 
 import warnings
@@ -84,7 +84,7 @@ class Spread:
 
 
 class Eikonal(Unit):
-    """Activation by the eikonal equation, with the cell model's pulse behind it."""
+    """Activation by the eikonal equation, followed by the pulse of the cell model."""
 
     name = "eikonal"
     groups = (PotentialScale, AlievPanfilov, Spread, TimeScale, Stimulus, Probes)

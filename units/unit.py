@@ -27,8 +27,8 @@ IMPLEMENTATION = Variable(
     "implementation",
     Causality.CALCULATED_PARAMETER,
     "1",
-    "what the unit computes with on this machine: kernels, instruction set, linear solver; results differ between them "
-    "in their last digits",
+    "the implementation that the unit uses on this machine: kernels, instruction set, linear solver; results differ "
+    "between implementations in their last digits",
     start="",
     fixed=True,
 )
@@ -36,7 +36,7 @@ FALLBACKS = Variable(
     "fallbacks",
     Causality.CALCULATED_PARAMETER,
     "1",
-    "what is slower on this machine than it need be, and what helps: a sentence a line",
+    "what is slower on this machine than necessary, and the remedy: one sentence per line",
     start="",
     fixed=True,
 )

@@ -64,6 +64,7 @@ class Variable:
     `pointwise` says that its value at a place follows those inputs at this place only. `fixed` variables keep their
     value after initialisation. `needs` names a parameter that must differ from zero for the input or output to matter.
     What an input starts with is a `stand_in` where only another unit knows its value: it lets the unit run by itself.
+    `recorded_with` names boundaries of the mesh without which there is nothing to record, the value being always 0.
     `missing` is the value at places that have none yet; `mean_record` says of a field what `record` says of its mean.
     `refines` says of a number that it decides the unit's numerical error, and how; it needs a lower limit.
     """
@@ -81,6 +82,7 @@ class Variable:
     pointwise: bool = False
     needs: str | None = None
     record: Record = Record.NOTHING
+    recorded_with: tuple[str, ...] = ()
     mean_record: Record = Record.NOTHING
     missing: float | None = None
     above: float | None = None
@@ -96,6 +98,10 @@ class Variable:
         else:
             places = (mesh.nodes if self.location is Location.NODE else mesh.elements,)
         return places if self.components == 1 else (*places, self.components)
+
+    def recorded_on(self, mesh: Mesh) -> Record:
+        """What a time series keeps of it on `mesh`."""
+        return self.record if set(self.recorded_with) <= set(mesh.boundaries) else Record.NOTHING
 
     def checked(self, value: Any) -> Scalar:
         """`value` as this parameter's type; InvalidInput names the parameter, the value and what is allowed."""

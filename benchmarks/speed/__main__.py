@@ -1,8 +1,9 @@
-"""How fast hearts beat, and how that grows with the mesh: writes docs/speed.md's tables and figure (some ten minutes).
+"""How long a heartbeat takes, and how that grows with the mesh: writes the tables and the figure of docs/speed.md.
 
-Seconds, and how often the same mesh's own undeformed stiffness could be factorised in that time by the same process:
-what survives machines. With `--sizes 8 5` only those meshes are measured, and printed. What was measured is kept in
-history.json, with machine and versions.
+It takes some ten minutes. Durations are given in seconds, and also as the number of times that the same process could
+factorise the undeformed stiffness of the same mesh in that time, which can be compared between machines. With
+`--sizes 8 5` only those meshes are measured, and the tables are printed only. Each measurement is kept in history.json,
+with the machine and the versions of the packages.
 """
 
 import argparse
@@ -23,7 +24,7 @@ from .tables import tables
 _ROOT = Path(__file__).parent.parent.parent
 _HISTORY = Path(__file__).parent / "history.json"
 _SIZES, _FINEST = (8.0, 5.0, 3.0, 2.0), 1.0
-#: Where the way of calling the units is compared.
+#: The mesh size at which the ways of calling the units are compared.
 _BASELINE = 5.0
 
 
@@ -35,7 +36,7 @@ def _measured(*arguments: object) -> dict[str, Any]:
 
 
 def _machine() -> dict[str, Any]:
-    """What the tables name of the machine, and the packages that decide the speed."""
+    """The machine and the versions of the packages that decide the speed, as the tables name them."""
     versions = {}
     for package in ("numpy", "scipy", "rslab"):
         try:
@@ -47,7 +48,7 @@ def _machine() -> dict[str, Any]:
 
 
 def _measure(sizes: list[float]) -> list[dict[str, Any]]:
-    # Built and unpacked once before anything is timed.
+    # FMUs are built and unpacked once before anything is timed.
     _measured("heartbeat", _BASELINE, "fmu", 5)
     found = [_measured("heartbeat", size, "native", 320) for size in sizes]
     if _BASELINE in sizes:

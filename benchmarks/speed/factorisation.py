@@ -1,6 +1,6 @@
-"""The measure of time that survives machines: one factorisation of a mesh's own undeformed stiffness.
+"""A measure of time that can be compared between machines: one factorisation of the undeformed stiffness of a mesh.
 
-Numeric, in double precision and one thread, with the supernodal solver where it is installed.
+The factorisation is numerical, in double precision and one thread, with the supernodal solver where it is installed.
 """
 
 from collections.abc import Callable

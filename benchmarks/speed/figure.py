@@ -1,4 +1,4 @@
-"""What was measured, as a figure: seconds of a heartbeat, and of what it consists, over the unknowns."""
+"""The measurements as a figure: the time of a heartbeat and of its parts over the number of unknowns."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""One measurement in a process of its own, whose peak memory is then that of what is measured: prints a line of JSON.
+"""One measurement in a process of its own, so that the peak memory is that of the measurement: prints a line of JSON.
 
 python -m benchmarks.speed.measure heartbeat 5 fmu 320
 python -m benchmarks.speed.measure electrophysiology 2 20
@@ -28,7 +28,7 @@ _SCENARIO = Path(__file__).parent.parent.parent / "scenarios" / "baseline.yaml"
 
 
 def heartbeat(size_mm: float, participants: str, stop_ms: float) -> dict[str, Any]:
-    """The baseline on a mesh of `size_mm`, results written, figures apart; then its unit of time."""
+    """The baseline on a mesh of `size_mm`, with results written and without figures; then one factorisation."""
     settings = {"scene.mesh_size_mm": size_mm, "run.participants": participants, "run.stop_ms": stop_ms}
     with TemporaryDirectory() as folder:
         begin = perf_counter()
@@ -52,7 +52,7 @@ def heartbeat(size_mm: float, participants: str, stop_ms: float) -> dict[str, An
 
 
 def electrophysiology(size_mm: float, stop_ms: float) -> dict[str, Any]:
-    """The unit alone, unstretched: seconds to set it up, and for each millisecond."""
+    """The unit alone, unstretched: seconds for the set-up, and ms for each step of 1 ms."""
     mesh = build("biventricle", size_mm)
     fiber = fibers_of(mesh).get("fiber")
     before = _peak_megabytes()
@@ -74,7 +74,7 @@ def electrophysiology(size_mm: float, stop_ms: float) -> dict[str, Any]:
 
 
 def solid(size_mm: float) -> dict[str, Any]:
-    """What the mechanics consists of, each alone, in ms."""
+    """The parts of the mechanics, each alone, in ms."""
     mesh = build("biventricle", size_mm)
     solid = solid_of(mesh)
     displacement = 1e-3 * np.sin(solid.space.points) * solid.free
@@ -89,7 +89,7 @@ def solid(size_mm: float) -> dict[str, Any]:
 
 
 def exchange(size_mm: float) -> dict[str, Any]:
-    """The three fields of a step, read from one unit's FMU and set in the next one's, in ms."""
+    """The exchange of the three fields of a step, from the FMU of one unit to that of the next, in ms."""
     with TemporaryDirectory() as folder:
         times = {f"fmi{fmi}_ms": heart_milliseconds(fmi, Path(folder), size_mm) for fmi in (2, 3)}
     return _size(build("biventricle", size_mm)) | times

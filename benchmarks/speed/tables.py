@@ -1,4 +1,4 @@
-"""What was measured, as tables for a page."""
+"""The measurements as tables for docs/speed.md."""
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
@@ -30,7 +30,7 @@ def of_kind(measured: list[Measured], kind: str) -> list[Measured]:
 
 
 def factorisations(one: Measured) -> float:
-    """The loop of a heartbeat in factorisations of its own stiffness."""
+    """The duration of the time loop of a heartbeat, in factorisations of its own stiffness."""
     return 1e3 * float(one["loop_s"]) / float(one["factorisation_ms"])
 
 
@@ -43,7 +43,7 @@ def _heartbeats(measured: list[Measured]) -> str:
     rows = [
         [
             f"{one['size_mm']:g} mm",
-            {"native": "direct", "fmu": "FMI 2.0", "fmu3": "FMI 3.0"}[one["participants"]],
+            {"native": "direct calls", "fmu": "FMI 2.0", "fmu3": "FMI 3.0"}[one["participants"]],
             f"{one['unknowns']}",
             f"{one['loop_s']:.2f}",
             f"{one['factorisation_ms']:.1f}",
@@ -56,16 +56,16 @@ def _heartbeats(measured: list[Measured]) -> str:
         for one in of_kind(measured, "heartbeat")
     ]
     names = (
-        "mesh",
-        "calls",
+        "heartbeat, mesh size",
+        "interface",
         "unknowns",
-        "loop, s",
-        "factorisation, ms",
-        "loop in factorisations",
+        "time loop, s",
+        "one factorisation, ms",
+        "time loop in factorisations",
         "mechanics, s",
         "electrophysiology, s",
         "master, s",
-        "peak, MB",
+        "peak memory, MB",
     )
     return _table(names, rows)
 
@@ -83,11 +83,11 @@ def _growth(measured: list[Measured]) -> str:
         ]
         for coarser, finer in pairs
     ]
-    return _table(("growth with unknowns, exponent", *_GROWING), rows) if rows else ""
+    return _table(("exponent of the growth with the unknowns", *_GROWING), rows) if rows else ""
 
 
 _GROWING: dict[str, Callable[[Measured], float]] = {
-    "loop": lambda one: float(one["loop_s"]),
+    "time loop": lambda one: float(one["loop_s"]),
     "mechanics": lambda one: float(one["units_s"]["mechanics"]),
     "electrophysiology": lambda one: float(one["units_s"]["electrophysiology"]),
     "one factorisation": lambda one: float(one["factorisation_ms"]),
@@ -99,7 +99,7 @@ def _solids(measured: list[Measured]) -> str:
         [f"{one['size_mm']:g} mm", *(f"{one[f'{name}_ms']:.2f}" for name in ("residual", "tangent", "stretch"))]
         for one in of_kind(measured, "solid")
     ]
-    return _table(("mechanics, ms", "residual", "tangent", "stretch"), rows)
+    return _table(("mechanics, ms per evaluation", "residual", "tangent", "stretch"), rows)
 
 
 def _exchanges(measured: list[Measured]) -> str:
@@ -107,7 +107,7 @@ def _exchanges(measured: list[Measured]) -> str:
         [f"{one['size_mm']:g} mm", f"{one['elements']}", f"{one['fmi2_ms']:.2f}", f"{one['fmi3_ms']:.2f}"]
         for one in of_kind(measured, "exchange")
     ]
-    return _table(("fields of a step, ms", "elements", "FMI 2.0", "FMI 3.0"), rows)
+    return _table(("exchange of the fields, ms per step", "elements", "FMI 2.0", "FMI 3.0"), rows)
 
 
 def _electrophysiology(measured: list[Measured]) -> str:
@@ -136,9 +136,9 @@ def _electrophysiology(measured: list[Measured]) -> str:
         "elements",
         "set-up, s",
         "exponent",
-        "a millisecond, ms",
+        "step of 1 ms, ms",
         "exponent",
-        "peak, MB",
+        "peak memory, MB",
     )
     return _table(names, rows)
 

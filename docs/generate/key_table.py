@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-Schema = Mapping[str, Any]
+Schema = dict[str, Any]
 
 #: How the types of JSON are called in YAML files.
 _TYPES = {
@@ -97,7 +97,9 @@ def _forms(schema: Schema, root: Schema) -> list[Schema]:
         return _forms(inner, root)
     alternatives = schema.get("anyOf") or schema.get("oneOf") or schema.get("allOf")
     if alternatives is None:
-        return [] if schema.get("type") == "null" else [schema]
+        kinds = schema.get("type")
+        each_kind = [schema | {"type": kind} for kind in kinds] if isinstance(kinds, list) else [schema]
+        return [form for form in each_kind if form.get("type") != "null"]
     return [form for each in alternatives for form in _forms(each, root)]
 
 
@@ -111,7 +113,7 @@ def _type(schema: Schema, root: Schema) -> str:
 
 def _type_of(form: Schema, root: Schema) -> str:
     if "enum" in form:
-        return " or ".join(f"`{value}`" for value in form["enum"])
+        return " or ".join(f"`{value}`" for value in form["enum"] if value is not None)
     if "const" in form:
         return f"`{form['const']}`"
     if form.get("type") == "array":

@@ -28,7 +28,7 @@ def lines(unit: type[Unit], mesh: Mesh, guid: str) -> Iterator[str]:
     yield from head(unit, guid, 2)
     yield "<VendorAnnotations>"
     yield tag("Tool", name=TOOL)
-    yield from annotations(unit)
+    yield from annotations(unit, mesh)
     yield "</Tool></VendorAnnotations>"
     yield "<ModelVariables>"
     for run in runs:

@@ -40,7 +40,7 @@ def lines(unit: type[Unit], mesh: Mesh, token: str) -> Iterator[str]:
     yield "</ModelStructure>"
     yield "<Annotations>"
     yield tag("Annotation", type=TOOL)
-    yield from annotations(unit)
+    yield from annotations(unit, mesh)
     yield "</Annotation></Annotations>"
     yield "</fmiModelDescription>"
 

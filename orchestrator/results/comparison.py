@@ -22,7 +22,7 @@ ACTIVATION = "activation_ms"
 _SAME_MS = 1e-6
 
 #: Units of measure as names end in them.
-_UNITS = ("ms", "mV", "mm", "ml", "kPa")
+_UNITS = ("ms", "mV", "mm", "ml", "kPa", "deg")
 
 #: A field of the times of events, which has no value where nothing has happened yet.
 _EVENTS = "_time_ms"
@@ -32,11 +32,12 @@ _EVENTS = "_time_ms"
 class Difference:
     """`value` in the measure's unit: infinite where only one of the runs has the quantity, NaN where none can be told.
 
-    `why` says so in words, for both.
+    `why` says so in words, for both. `time_ms` is when the difference is that large, where it is of a moment.
     """
 
     value: float
     why: str = ""
+    time_ms: float | None = None
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,10 @@ def _curve(column: str, run: StoredRun, reference: StoredRun) -> Difference:
     here, there = _common(run.columns["time_ms"], reference.columns["time_ms"])
     apart = np.abs(run.columns[column][here] - reference.columns[column][there])
     # Units that step less often leave gaps.
-    known = apart[np.isfinite(apart)]
-    return Difference(float(known.max())) if len(known) else Difference(nan, f"{column} has no time in common")
+    if not np.isfinite(apart).any():
+        return Difference(nan, f"{column} has no time in common")
+    row = int(np.argmax(np.where(np.isfinite(apart), apart, -inf)))
+    return Difference(float(apart[row]), time_ms=float(reference.columns["time_ms"][there[row]]))
 
 
 def _field(name: str, run: StoredRun, reference: StoredRun) -> Difference:
@@ -119,11 +122,14 @@ def _field(name: str, run: StoredRun, reference: StoredRun) -> Difference:
     if why:
         return Difference(nan, why)
     here, there = _common(run.frames_ms, reference.frames_ms)
-    largest = 0.0
+    apart = []
     for own, other in zip(here.tolist(), there.tolist(), strict=True):
-        apart = _part(run, name, own, count) - _part(reference, name, other, count)
-        largest = max(largest, float(np.sqrt((apart * apart).sum() / count)))
-    return Difference(largest) if len(here) else Difference(nan, f"{name} has no time in common")
+        difference = _part(run, name, own, count) - _part(reference, name, other, count)
+        apart.append(float(np.sqrt((difference * difference).sum() / count)))
+    if not apart:
+        return Difference(nan, f"{name} has no time in common")
+    frame = int(np.argmax(apart))
+    return Difference(apart[frame], time_ms=float(reference.frames_ms[there[frame]]))
 
 
 def _events(name: str, run: StoredRun, reference: StoredRun) -> Difference:

@@ -1,9 +1,10 @@
 """fields.h5 with fields.xdmf: all fields every few steps, for ParaView and for reading back.
 
-Layout of the HDF5 file: `points_mm`, `cells`, fixed fields by name (`fiber`, `sheet`), `frames_ms`, and under
-`frames/` one data set per field, named with its unit, whose first axis is the frame. `views/<frame>/<field>` are
-windows on single frames, without data of their own: what the XDMF file points to, because readers of XDMF disagree
-about hyperslabs (libxdmf3 takes the axes in reverse and shows wrong values without an error).
+Layout of the HDF5 file: `points_mm`, `cells`, under `boundaries/` the faces of each named boundary of the mesh by
+their nodes (`boundaries`), fixed fields by name (`fiber`, `sheet`), `frames_ms`, and under `frames/` one data set per
+field, named with its unit, whose first axis is the frame. `views/<frame>/<field>` are windows on single frames, without
+data of their own: what the XDMF file points to, because readers of XDMF disagree about hyperslabs (libxdmf3 takes the
+axes in reverse and shows wrong values without an error).
 
 While a run goes on, the frames lie in `fields.parts/`, a file each, and fields.h5 has the same layout, but for the
 views, with `frames_ms` and `frames/` mapped onto them: an HDF5 file that is being written to is not readable any more
@@ -25,6 +26,7 @@ from ..coupling.master import Accepted
 from ..participants.native import Mesh
 from ..participants.participant import Participant, Port, Values
 from ..writing import remove_stale, writing
+from .boundaries import write_boundaries
 from .hdf5 import write_mapping, write_streamed
 from .names import FIELDS, PARTS, XDMF
 from .parts import TIME, Parts, series
@@ -116,6 +118,7 @@ class Fields:
         def fill(file: h5py.File) -> None:
             file["points_mm"] = self._mesh.points
             file["cells"] = self._mesh.cells
+            write_boundaries(file, self._mesh.boundaries)
             for name, values in self._fixed.items():
                 file[name] = values
             add_frames(file)

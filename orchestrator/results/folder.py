@@ -33,6 +33,7 @@ from .names import (
 )
 from .origin import Origin
 from .recording import Recording
+from .request import Request
 from .summary import is_summary
 from .whole import reserve, unfinished
 
@@ -45,9 +46,10 @@ _REMEDY = "run without --resume to begin anew"
 class ResultsFolder:
     """While entered, no other run writes to the folder; InputError if one does, or if nothing can be written there."""
 
-    def __init__(self, path: Path, origin: Origin) -> None:
+    def __init__(self, path: Path, origin: Origin, request: Request) -> None:
         self.path = path
         self._origin = origin
+        self._request = request
         self._lock: FolderLock | None = None
 
     def __enter__(self) -> "ResultsFolder":
@@ -150,7 +152,7 @@ class ResultsFolder:
             with writing(self.path / PARTS):
                 self._remove_parts()
         with allowed(self.path, "--output"), nullcontext() if before is None else self.fitting():
-            return Recording(self.path, self._origin, assembly, before, costs, implementations)
+            return Recording(self.path, self._origin, self._request, assembly, before, costs, implementations)
 
     def _check_places(self) -> None:
         """InputError where something is in the way of a file, before any is touched."""

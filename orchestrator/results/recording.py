@@ -25,6 +25,7 @@ from .origin import Origin
 from .parts import check_parts
 from .profile import Profile
 from .recorder import Recorder
+from .request import Request
 from .summary import write_summary
 from .time_series import TimeSeries
 
@@ -64,6 +65,7 @@ class Recording:
         self,
         folder: Path,
         origin: Origin,
+        request: Request,
         assembly: Assembly,
         before: Memories | None,
         costs: Costs,
@@ -72,7 +74,7 @@ class Recording:
         self.summary: dict[str, Any] = {}
         self.diagnosis: list[str] = []
         self._refusal: RunError | None = None
-        self._folder, self._origin, self._assembly = folder, origin, assembly
+        self._folder, self._origin, self._request, self._assembly = folder, origin, request, assembly
         scenario, participants, master = assembly.scenario, assembly.participants, assembly.master
         self._costs = costs
         self._implementations = implementations
@@ -167,6 +169,7 @@ class Recording:
             "resumable": resumable,
             "warnings": [*self._assembly.warnings, *slower, *self.diagnosis],
             "implementation": implementation.texts(self._implementations),
+            **self._request.content(),
         }
         scenario, costs = self._assembly.scenario, self._costs.content()
         path = self._folder / SUMMARY

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..participants.participant import Values
+from .boundaries import read_boundaries
 from .names import COUPLING, FIELDS, SUMMARY, TIME_SERIES
 
 if TYPE_CHECKING:
@@ -57,6 +58,9 @@ class StoredRun:
     ----------
     mesh:
         The undeformed body; None without fields.h5 and for scenes of other elements.
+    boundaries:
+        The faces of the mesh's named boundaries by their nodes, each of shape (faces, dimension): of a solid triangles
+        whose normals point out of the tissue. Empty where there are none, and for runs of versions that kept none.
     frames_ms:
         Times of the stored frames, shape (frames,).
     columns:
@@ -77,6 +81,13 @@ class StoredRun:
         except (OSError, ValueError):
             return {}
         return content if isinstance(content, dict) else {}
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The keys of the scenario that were set to other values than its file has, with these values."""
+        request = self.summary.get("request")
+        settings = request.get("settings") if isinstance(request, dict) else None
+        return settings if isinstance(settings, dict) else {}
 
     def time_series(self) -> "pandas.DataFrame":
         """The time series as a data frame, texts included, indexed by `time_ms`; empty where there is none."""
@@ -106,10 +117,22 @@ class StoredRun:
         """See the class."""
         return _numbers(self.folder / TIME_SERIES)
 
+    def numbers(self, name: str) -> dict[str, Values]:
+        """The columns of numbers of another table in the folder, as `columns`; empty where there is none."""
+        return _numbers(self.folder / name)
+
     @cached_property
     def points_mm(self) -> Values | None:
         """The undeformed nodes of any scene, shape (nodes, 3)."""
         return self._read("points_mm")
+
+    @cached_property
+    def boundaries(self) -> dict[str, NDArray[np.int64]]:
+        """See the class."""
+        if not self._fields.exists():
+            return {}
+        with h5py.File(self._fields, "r") as file:
+            return read_boundaries(file)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

@@ -18,6 +18,13 @@ _MOST_PROBLEMS, _LONGEST_ORIGIN = 20, 300
 #: Sections in sections that `--set` can name.
 _DEEPEST_KEY = 20
 
+#: A scene has a geometry or a mesh file, and each has keys of its own: whoever sets the one means it instead of the
+#: other.
+_INSTEAD = {
+    "scene.mesh": ("scene.geometry", "scene.mesh_size_mm"),
+    "scene.geometry": ("scene.mesh", "scene.boundaries", "scene.scale"),
+}
+
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -60,20 +67,38 @@ def checked(content: dict[str, Any], path: Path, assignments: Sequence[str] = ()
     origin = str(path)
     if assignments:
         origin += " with " + shortened(", ".join(f"--set {text}" for text in assignments), _LONGEST_ORIGIN)
-    for assignment in assignments:
-        _assign(content, assignment)
+    parsed = [(_parsed(assignment), assignment) for assignment in assignments]
+    _remove(content, replaced(dict(setting for setting, _ in parsed)))
+    for (key, value), assignment in parsed:
+        _place(content, key.split("."), value, f"--set {shortened(assignment, _LONGEST_ORIGIN)}", "--set ")
     return validated(content, Scenario, origin)
 
 
 def with_settings(content: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of a scenario's `content` with the values of `settings` at their keys (`coupling.step_ms`)."""
+    """A copy of a scenario's `content` with the values of `settings` at their keys (`coupling.step_ms`).
+
+    Keys that these replace are left out (`replaced`).
+    """
     changed = dict(content)
+    _remove(changed, replaced(settings))
     for key, value in settings.items():
         parts = key.split(".")
         if not _is_key(key, parts):
             raise InputError(f"{quoted(key)}: write a key of a scenario as coupling.step_ms")
         _place(changed, parts, value, quoted(key), "")
     return changed
+
+
+def replaced(settings: Mapping[str, Any]) -> list[str]:
+    """Keys of a scenario that must go where `settings` are put in: a geometry where a mesh is set, and the reverse.
+
+    What the settings name themselves stays, so that setting both is the contradiction that it is in a file.
+    """
+    if "scene" in settings:
+        # The whole section is new: nothing of the file is left in it.
+        return []
+    named = {".".join(key.split(".")[:2]) for key in settings}
+    return [key for new, old in _INSTEAD.items() if settings.get(new) is not None for key in old if key not in named]
 
 
 def parsed_assignments(assignments: Iterable[str]) -> dict[str, Any]:
@@ -128,9 +153,11 @@ def _read(path: Path, kind: str) -> Any:
         raise InputError(f"{path}: {error}") from None
 
 
-def _assign(content: dict[str, Any], assignment: str) -> None:
-    key, value = _parsed(assignment)
-    _place(content, key.split("."), value, f"--set {shortened(assignment, _LONGEST_ORIGIN)}", "--set ")
+def _remove(content: dict[str, Any], keys: Iterable[str]) -> None:
+    """Leave out `section.key`s; their sections are copied, for in YAML two can be one, by an alias."""
+    for section, _, last in (key.partition(".") for key in keys):
+        if isinstance(found := content.get(section), Mapping):
+            content[section] = {key: value for key, value in found.items() if key != last}
 
 
 def _place(content: dict[str, Any], parts: Sequence[str], value: Any, told: str, option: str) -> None:

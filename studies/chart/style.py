@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ...orchestrator.results.figures.colors import COLORS
+from ..pictures.colors import COLORS
 
 #: Markers as Matplotlib and as Plotly call them. Crosses are left out: they mark points without results.
 _MARKERS = (

@@ -6,7 +6,7 @@ from typing import Any
 
 from matplotlib.colors import to_hex, to_rgb
 
-from ...orchestrator.results.figures.colors import COLORS
+from ..pictures.colors import COLORS
 from .map import DIVERGED, INACCURATE, NOT_CONVERGED, NOT_RUN, OSCILLATING, SOUND, UNIT_FAILED
 
 #: Side of the square in pixels that repeats in a swatch of the page.

@@ -51,6 +51,9 @@ class Reader:
         elif program == "./setup.sh":
             assert set(words_of(line)) <= {"test"}
             assert (ROOT / "setup.sh").stat().st_mode & 0o111
+        elif name in (".", "source"):
+            (script,) = words_of(line)
+            assert (self._folder / script).is_file(), line
         elif name == "xdg-open":
             for word in words_of(line):
                 self._expect(Path(word))

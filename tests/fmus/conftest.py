@@ -27,9 +27,9 @@ _spec.loader.exec_module(_fmi_driver)
 #: Parameters other than the defaults: of every FMI type, and such that every input matters.
 PARAMETERS: dict[str, dict[str, Any]] = {
     "fiber_generator": {"endocardial_angle_deg": 51.5},
-    "electrophysiology": {"activation_time_map": "seed", "longest_substep_ms": 0.05},
+    "electrophysiology": {"activation_time_map": "as_printed", "longest_substep_ms": 0.05},
     "active_stress": {"length_dependence": 0.7, "delay_slope_per_mV": 0.5},
-    "eikonal": {"activation_time_map": "seed", "diffusion_anisotropic_mm2_per_ms": 0.3},
+    "eikonal": {"activation_time_map": "as_printed", "diffusion_anisotropic_mm2_per_ms": 0.3},
     "local_mechanics": {"hold": "isometric", "shear_modulus_MPa": 0.3},
     "mechanics": {"newton_iterations": 30, "shear_modulus_MPa": 0.3},
     "mass": {"k": 5.0, "k_c": 20.0, "c_c": 0.5, "x_start": 1.0},

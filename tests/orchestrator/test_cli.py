@@ -83,9 +83,9 @@ def test_exit_codes_as_a_shell_sees_them(small_scenario: Path, tmp_path: Path) -
         "run",
         small_scenario,
         "--output",
-        tmp_path / "seed",
+        tmp_path / "as_printed",
         "--set",
-        "units.mechanics.parameters.neo_hooke_log_sign=seed",
+        "units.mechanics.parameters.neo_hooke_log_sign=as_printed",
     )
     assert (failed.returncode, failed.stdout) == (3, "")
     assert failed.stderr.startswith("failed: unit 'mechanics' failed at its initialisation")
@@ -246,7 +246,7 @@ _SETS: dict[str, tuple[list[str], list[str]]] = {
     "endless modulus": ([_P + "shear_modulus_MPa=" + "9" * 400], ["shear_modulus_MPa", "finite"]),
     "text for a modulus": ([_P + "shear_modulus_MPa=stiff"], ["'shear_modulus_MPa' is 'stiff'", "number"]),
     "true for a modulus": ([_P + "shear_modulus_MPa=true"], ["'shear_modulus_MPa' is True", "number"]),
-    "unknown choice": ([_P + "neo_hooke_log_sign=seeed"], ["'neo_hooke_log_sign' is 'seeed'", "seed"]),
+    "unknown choice": ([_P + "neo_hooke_log_sign=seed"], ["'neo_hooke_log_sign' is 'seed'", "as_printed"]),
     "number as choice": ([_P + "neo_hooke_log_sign=1"], ["'neo_hooke_log_sign' is 1", "choose one of"]),
     "negative rate": (["units.active_stress.parameters.slow_rate_per_ms=-0.1"], ["units.active_stress", "> 0"]),
     "connection to nowhere": (["connections=[mechanics.strech -> active_stress.stretch]"], ["did you mean 'stretch'?"]),
@@ -617,7 +617,7 @@ def test_the_seeds_two_slips_end_with_3_and_no_nan_anywhere(
         "--fmu-dir",
         fmu_dir,
         "--set",
-        f"units.{parameter}=seed",
+        f"units.{parameter}=as_printed",
     )
     assert ended.code == 3
     assert ended.err.startswith("failed: ")

@@ -19,6 +19,7 @@ from cardiac_cosim.orchestrator.probes import Probes
 from cardiac_cosim.orchestrator.results.coupling_log import CouplingLog
 from cardiac_cosim.orchestrator.results.fields import Fields
 from cardiac_cosim.orchestrator.results.origin import Origin
+from cardiac_cosim.orchestrator.results.stored_run import StoredRun
 from cardiac_cosim.orchestrator.results.summary import crossing_time, write_summary
 from cardiac_cosim.orchestrator.results.table import Table
 from cardiac_cosim.orchestrator.results.time_series import TimeSeries
@@ -74,6 +75,10 @@ def test_the_time_series_has_the_columns_of_the_contract_and_a_row_per_step(done
         "lv_volume_ml",
         "rv_volume_ml",
         "apex_uplift_mm",
+        "twist_deg",
+        "radial_strain",
+        "circumferential_strain",
+        "longitudinal_strain",
         "active_stress_mean_kPa",
     ]
     assert rows[:, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 7]
@@ -219,6 +224,7 @@ def test_the_fields_hold_mesh_fibres_and_a_frame_every_so_often(done: Outcome, s
         assert shapes == {
             "points_mm": (nodes, 3),
             "cells": (elements, 4),
+            **{f"boundaries/{name}": faces.shape for name, faces in small_heart.boundaries.items()},
             "fiber": (elements, 3),
             "sheet": (elements, 3),
             "frames_ms": (3,),
@@ -233,6 +239,51 @@ def test_the_fields_hold_mesh_fibres_and_a_frame_every_so_often(done: Outcome, s
         np.testing.assert_allclose(np.linalg.norm(file["fiber"][:], axis=1), 1.0, atol=1e-12)
         assert (file["frames/displacement_mm"][0] == 0.0).all()
         assert (file["frames/displacement_mm"][2] != 0.0).any()
+
+
+def _check_boundaries(folder: Path, mesh: Mesh) -> None:
+    stored = StoredRun(folder).boundaries
+    assert stored.keys() == mesh.boundaries.keys()
+    for name, faces in mesh.boundaries.items():
+        assert stored[name].dtype == np.int64
+        # In their order and orientation, by which normals point out of the tissue.
+        np.testing.assert_array_equal(stored[name], faces)
+
+
+def test_the_boundaries_come_back_under_their_names(done: Outcome, small_heart: Mesh) -> None:
+    assert len(small_heart.boundaries) == 5
+    _check_boundaries(done.folder, small_heart)
+
+
+def test_boundaries_may_have_any_name_and_are_there_while_the_run_goes_on(
+    fake, port, master, tmp_path: Path, small_heart: Mesh
+) -> None:
+    faces = small_heart.boundary("base")
+    names = ["base", "a/b", "a", "%2F", "/", ".", "..", "...", "Vorhof links, Öffnung", "a%2Fb", "a\0b"]
+    mesh = Mesh(small_heart.points, small_heart.cells, {name: faces[: 2 + n] for n, name in enumerate(names)})
+    field = port("phi", shape=(mesh.nodes,), location="node", record="nothing")
+    units = {"a": fake("a", outputs=[field])}
+    fields = Fields(tmp_path, units, mesh)
+    _check_boundaries(tmp_path, mesh)
+
+    class Reader:
+        def accept(self, step: Accepted, exchange: Any) -> None:
+            _check_boundaries(tmp_path, mesh)
+
+    master(units, 4, every_ms=2.0).run([fields, Reader()])
+    # What a resumed run begins with, and ends with.
+    resumed = Fields(tmp_path, units, mesh, fields.memory())
+    resumed.close()
+    _check_boundaries(tmp_path, mesh)
+    with h5py.File(tmp_path / "fields.h5") as file:
+        assert len(file["frames_ms"]) == 3
+
+
+def test_meshes_without_boundaries_and_runs_that_kept_none_have_none(tmp_path: Path, small_heart: Mesh) -> None:
+    assert StoredRun(tmp_path).boundaries == {}
+    Fields(tmp_path, {}, Mesh(small_heart.points, small_heart.cells)).close()
+    assert StoredRun(tmp_path).boundaries == {}
+    assert StoredRun(tmp_path).points_mm is not None
 
 
 def _check_xdmf(folder: Path) -> list[float]:
@@ -429,7 +480,7 @@ def test_a_field_that_cannot_be_fetched_leaves_no_half_a_frame(
 def test_a_failed_run_of_the_heart_says_so_in_its_summary(small_heart_file: Path, tmp_path: Path) -> None:
     units = {
         "electrophysiology": {"unit": "electrophysiology", "parameters": {"stimulus_depth_mm": 5.0}},
-        "active_stress": {"unit": "active_stress", "parameters": {"delay_function": "seed"}},
+        "active_stress": {"unit": "active_stress", "parameters": {"delay_function": "as_printed"}},
         "fibers": {"unit": "fiber_generator"},
     }
     with pytest.raises(RunError, match="unit 'active_stress' failed in the step") as caught:

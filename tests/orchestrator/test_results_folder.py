@@ -31,8 +31,10 @@ from cardiac_cosim.orchestrator.results.iteration_log import IterationLog
 from cardiac_cosim.orchestrator.results.origin import Origin
 from cardiac_cosim.orchestrator.results.parts import Parts
 from cardiac_cosim.orchestrator.results.recording import Recording
+from cardiac_cosim.orchestrator.results.request import Request
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.report.presentation import Presentation
 from cardiac_cosim.units.mesh.file import read_mesh, write_mesh
 from fallbacks import without_fallbacks
 
@@ -106,7 +108,7 @@ def test_a_second_run_in_a_folder_ends_with_2_and_touches_nothing(
         _run(small_scenario, out)
     elif state == "interrupted":
         _interrupted(small_scenario, out, monkeypatch)
-    with ResultsFolder(out, Origin.of(load_scenario(small_scenario), tmp_path)):
+    with ResultsFolder(out, Origin.of(load_scenario(small_scenario), tmp_path), Request()):
         before = _bytes(out)
         ended = cosim(*_arguments(small_scenario, out, *(["--resume"] if resume else [])))
         assert _bytes(out) == before
@@ -150,7 +152,7 @@ def test_threads_of_one_process_exclude_each_other_too(small_scenario: Path, tmp
     def enter() -> None:
         for _ in range(200):
             try:
-                with ResultsFolder(tmp_path / "out", origin):
+                with ResultsFolder(tmp_path / "out", origin, Request()):
                     with guard:
                         inside[0] += 1
                         most[0] = max(most[0], inside[0])
@@ -496,7 +498,7 @@ def test_a_file_that_cannot_be_closed_neither_loses_the_summary_nor_hides_the_ph
 
     monkeypatch.setattr(Fields, "close", refuse)
     with pytest.raises(RunError, match=r"unit 'active_stress' failed in the step.*besides") as caught:
-        _run(small_scenario, tmp_path / "out", "units.active_stress.parameters.delay_function=seed")
+        _run(small_scenario, tmp_path / "out", "units.active_stress.parameters.delay_function=as_printed")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (summary["status"], summary["message"]) == ("failed", str(caught.value))
     # The frames are what is left of the fields then.
@@ -617,6 +619,7 @@ import os, sys
 from pathlib import Path
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
+from cardiac_cosim.report.presentation import Presentation
 from cardiac_cosim.orchestrator.errors import InputError
 path, out = Path({str(small_scenario)!r}), Path({str(out)!r})
 scenario = load_scenario(path, {list(_SETS)!r})
@@ -639,7 +642,7 @@ def test_figures_that_cannot_be_written_are_a_warning(
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "figures").write_text("a file")
     scenario = load_scenario(small_scenario, _SETS)
-    outcome = run_scenario(scenario, small_scenario.parent, tmp_path / "out", figures=True)
+    outcome = run_scenario(scenario, small_scenario.parent, tmp_path / "out", companion=Presentation(tmp_path / "out"))
     assert outcome.summary["status"] == "done"
     assert len(outcome.warnings) == 1
     assert "figures" in outcome.warnings[0]

@@ -58,6 +58,14 @@ def test_paths_lead_to_the_same_files_from_the_new_folder(file: Path) -> None:
     assert (path.parent / tuned.inputs.file).resolve() == file.parent.parent / "signals.csv"
 
 
+def test_an_editor_finds_the_schema_from_the_new_folder(file: Path) -> None:
+    line = "# yaml-language-server: $schema="
+    for path, expected in (("schema/s.json", "../../scenarios/schema/s.json"), ("https://x.org/s", "https://x.org/s")):
+        file.write_text(f"{line}{path}\n{_TEXT}")
+        text, _ = _written(file, {})
+        assert text.splitlines()[0] == f"{line}{expected}"
+
+
 def test_settings_are_those_that_were_asked_for(file: Path) -> None:
     settings = {
         "coupling.iterate": None,
@@ -88,6 +96,17 @@ def test_a_section_that_stands_for_two_is_changed_in_one_place(file: Path) -> No
     tuned = load_scenario(path)
     assert tuned.units["first"].parameters == {"k": 2}
     assert tuned.units["second"].parameters == {"k": 1}
+
+
+def test_a_mesh_in_place_of_a_geometry_leaves_no_geometry_in_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "scenarios" / "two.yaml"
+    path.parent.mkdir()
+    path.write_text("# A slab.\nname: a\nscene: {geometry: slab, mesh_size_mm: 3}\nunits: {m: {unit: mechanics}}\n")
+    text, written = _written(path, {"scene.mesh": "own.msh"})
+    assert text.splitlines()[0] == "# A slab."
+    scene = load_scenario(written).scene
+    assert scene is not None
+    assert (scene.geometry, scene.mesh) == (None, "../../scenarios/own.msh")
 
 
 def test_a_setting_that_is_not_valid_is_refused(file: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from cardiac_cosim.orchestrator.coupling.timeline import Timeline
 from cardiac_cosim.orchestrator.errors import InputError
-from cardiac_cosim.orchestrator.scenario import Scenario, load_scenario
+from cardiac_cosim.orchestrator.scenario import Scenario, load_scenario, scenario_content, with_settings
 
 FULL = """\
 name: baseline
@@ -385,6 +385,64 @@ def test_set_reaches_into_one_of_two_sections_that_are_one_by_an_alias(tmp_path:
     scenario = _load(tmp_path, text, "units.other.parameters.a=2")
     assert scenario.units["mechanics"].parameters == {"a": 1}
     assert scenario.units["other"].parameters == {"a": 2}
+
+
+_GEOMETRY = SMALL.replace("{mesh: heart.msh}", "{geometry: slab, mesh_size_mm: 3, refine: 1}")
+_MESH = SMALL.replace("{mesh: heart.msh}", "{mesh: heart.msh, boundaries: {base: 3}, scale: cm, refine: 1}")
+
+
+def test_a_mesh_that_is_set_takes_the_place_of_a_geometry_and_its_size(tmp_path: Path) -> None:
+    changed = _load(tmp_path, _GEOMETRY, "scene.mesh=own.msh", "scene.boundaries.base=[1, 2]").scene
+    assert changed is not None
+    assert (changed.geometry, changed.mesh, changed.refine) == (None, "own.msh", 1)
+    assert changed.boundaries == {"base": [1, 2]}
+    # What the file says of its own mesh holds for another one, too.
+    other = _load(tmp_path, _MESH, "scene.mesh=own.msh").scene
+    assert other is not None
+    assert (other.mesh, other.boundaries, other.scale) == ("own.msh", {"base": [3]}, "cm")
+
+
+def test_a_geometry_that_is_set_takes_the_place_of_a_mesh_and_what_is_said_of_it(tmp_path: Path) -> None:
+    for sets in (("scene.geometry=slab", "scene.mesh_size_mm=4"), ("scene.mesh_size_mm=4", "scene.geometry=slab")):
+        changed = _load(tmp_path, _MESH, *sets).scene
+        assert changed is not None
+        assert (changed.geometry, changed.mesh, changed.mesh_size_mm) == ("slab", None, 4.0)
+        assert (changed.boundaries, changed.scale, changed.refine) == ({}, None, 1)
+
+
+@pytest.mark.parametrize(
+    ("content", "sets", "words"),
+    [
+        (_GEOMETRY, ("scene.mesh=a.msh", "scene.geometry=slab"), "either `geometry`"),
+        (_MESH, ("scene.geometry=slab", "scene.mesh=a.msh"), "either `geometry`"),
+        (_GEOMETRY, ("scene={geometry: slab}", "scene.mesh=a.msh"), "either `geometry`"),
+        (_GEOMETRY, ("scene.mesh=a.msh", "scene.mesh_size_mm=3"), "`mesh_size_mm` has no meaning with `mesh`"),
+        (_MESH, ("scene.geometry=slab", "scene.scale=m"), "`boundaries` and `scale` are for"),
+        (_MESH, ("scene.geometry=slab", "scene.boundaries.base=4"), "`boundaries` and `scale` are for"),
+        # Nothing is set by null, so that nothing is replaced.
+        (_GEOMETRY, ("scene.geometry=null",), "either `geometry`"),
+    ],
+)
+def test_what_is_set_together_and_cannot_stand_together_is_refused(
+    tmp_path: Path, content: str, sets: tuple[str, ...], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        _load(tmp_path, content, *sets)
+
+
+def test_studies_and_notebooks_replace_a_geometry_in_the_same_way_and_leave_the_content_alone(tmp_path: Path) -> None:
+    (tmp_path / "scene.yaml").write_text(_GEOMETRY)
+    content = scenario_content(tmp_path / "scene.yaml")
+    changed = with_settings(content, {"scene.mesh": "own.msh"})
+    assert changed["scene"] == {"mesh": "own.msh", "refine": 1}
+    assert content["scene"] == {"geometry": "slab", "mesh_size_mm": 3, "refine": 1}
+    assert with_settings(content, {"scene.mesh": None})["scene"] == content["scene"] | {"mesh": None}
+
+
+def test_no_other_section_that_is_one_with_the_scene_by_an_alias_loses_anything(tmp_path: Path) -> None:
+    (tmp_path / "scene.yaml").write_text("scene: &a {geometry: slab, mesh_size_mm: 3}\nother: *a\n")
+    changed = with_settings(scenario_content(tmp_path / "scene.yaml"), {"scene.mesh": "own.msh"})
+    assert changed == {"scene": {"mesh": "own.msh"}, "other": {"geometry": "slab", "mesh_size_mm": 3}}
 
 
 @pytest.mark.parametrize(

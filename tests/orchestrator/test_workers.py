@@ -205,7 +205,7 @@ def _mapped(pid: int) -> str:
 
 
 def test_the_failure_of_a_unit_elsewhere_is_told_like_one_here(small_scenario: Path, tmp_path: Path) -> None:
-    sets = ("units.active_stress.parameters.delay_function=seed", "run.workers=processes")
+    sets = ("units.active_stress.parameters.delay_function=as_printed", "run.workers=processes")
     with pytest.raises(RunError, match=r"unit 'active_stress' failed .* the delay function gives the rate"):
         _series(small_scenario, tmp_path / "out", *sets)
     with pytest.raises(InputError, match="has no parameter"):

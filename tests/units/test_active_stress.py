@@ -34,15 +34,15 @@ def test_delay_function_does_not_overflow(potential: float) -> None:
 
 
 def test_seeds_delay_is_the_printed_one_and_negative_when_depolarised() -> None:
-    seed = Tension(delay_function="seed")
+    printed = Tension(delay_function="as_printed")
     np.testing.assert_allclose(
-        seed.rate(np.array([-80.0, 0.0, 20.0])), [0.1, 0.1 - 0.9 * np.exp(-1.0), -0.8], rtol=1e-6
+        printed.rate(np.array([-80.0, 0.0, 20.0])), [0.1, 0.1 - 0.9 * np.exp(-1.0), -0.8], rtol=1e-6
     )
 
 
 def test_plateau_is_about_half_a_megapascal(cube, started) -> None:
-    # Independent computation (model.md, Active stress): plateau 0.498 MPa, the target at a potential just below the
-    # peak of 19.95 mV; reached within 1 % after 5 ms, five times 1/ε₁.
+    # Independent computation (docs/model.md, Active stress): plateau 0.498 MPa, the target at a potential just below
+    # the peak of 19.95 mV; reached within 1 % after 5 ms, five times 1/ε₁.
     unit = started(ActiveStress, cube, potential=np.full(cube.nodes, 19.6))
     unit.do_step(0.0, 0.005)
     np.testing.assert_allclose(unit.get("active_stress"), 498.0, rtol=0.01)
@@ -143,11 +143,11 @@ def test_step_of_zero_leaves_the_state_to_the_bit(cube, started) -> None:
         assert unit.get_state().state[name].tobytes() == value.tobytes(), name
 
 
-# --- the seed's delay fails ----------------------------------------------------------------------------------------
+# --- the printed delay fails ------------------------------------------------------------------------------------------
 
 
 def test_seeds_delay_runs_at_rest_and_fails_when_depolarised(cube, started) -> None:
-    unit = started(ActiveStress, cube, {"delay_function": "seed"})
+    unit = started(ActiveStress, cube, {"delay_function": "as_printed"})
     unit.do_step(0.0, 0.001)
     assert not unit.get("active_stress").any()
     potential = np.full(cube.nodes, _REST)
@@ -155,7 +155,8 @@ def test_seeds_delay_runs_at_rest_and_fails_when_depolarised(cube, started) -> N
     potential[5] = -0.78
     unit.set("potential", potential)
     before = unit.get_state()
-    with pytest.raises(StepFailure, match=r"node 5 .*-0\.8 mV.*as the seed prints it; use delay_function: gompertz"):
+    reason = r"node 5 .*-0\.8 mV.*as printed in the source document; use delay_function: gompertz"
+    with pytest.raises(StepFailure, match=reason):
         unit.do_step(0.001, 0.001)
     assert all(unit.get_state().state[name] is value for name, value in before.state.items())
     potential[5] = -0.80

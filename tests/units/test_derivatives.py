@@ -61,7 +61,7 @@ _CASES = {
     "active_stress-euler": _Case(ActiveStress, {"time_integration": "forward_euler", "length_dependence": 2.0}),
     "active_stress-as_printed": _Case(
         ActiveStress,
-        {"delay_function": "seed", "slow_rate_per_ms": 0.5, "fast_rate_per_ms": 0.8, "delay_slope_per_mV": 0.05},
+        {"delay_function": "as_printed", "slow_rate_per_ms": 0.5, "fast_rate_per_ms": 0.8, "delay_slope_per_mV": 0.05},
         ramped=True,
     ),
     "active_stress-no_length": _Case(ActiveStress, {"length_dependence": 2.0}, step_ms=0.0),

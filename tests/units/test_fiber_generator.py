@@ -7,9 +7,9 @@ linear in it, and the fibre's angle follows in closed form.
 import numpy as np
 import pytest
 from cardiac_cosim.units.errors import InvalidInput
-from cardiac_cosim.units.fiber_generator.transmural import transmural_direction, wall_distance
 from cardiac_cosim.units.fiber_generator.unit import FiberGenerator, relative_distance, rotated_fiber
 from cardiac_cosim.units.mesh import Mesh
+from cardiac_cosim.units.mesh.transmural import transmural_direction, wall_distance
 
 _INNER, _OUTER, _BOTTOM = 10.0, 20.0, -30.0
 _ENDOCARDIUM = ("lv_endocardium", "rv_endocardium")

@@ -7,10 +7,10 @@ import pytest
 from cardiac_cosim.units.electrophysiology import Electrophysiology
 from cardiac_cosim.units.errors import InvalidInput
 from cardiac_cosim.units.fiber_generator import FiberGenerator
-from cardiac_cosim.units.fiber_generator.transmural import wall_distance
 from cardiac_cosim.units.geometry.registry import build
 from cardiac_cosim.units.mesh import Mesh
 from cardiac_cosim.units.mesh.refinement import check_levels, refined
+from cardiac_cosim.units.mesh.transmural import wall_distance
 
 _STIMULUS = {"stimulus_x_min_mm": -1.0, "stimulus_x_max_mm": 8.0, "time_scale_reduction": 0.0}
 

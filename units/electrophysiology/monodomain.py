@@ -3,7 +3,7 @@
     M dφ/dt = −(K + G) φ + G φ_s + f(φ, states),   dstates/dt = ionic rates
 
 M mass, K diffusion with D = d_iso I + d_ani a₀⊗a₀, G the mass weighted per element with the conductance
-G_s max(λ − 1, 0)/β_t, and f the load of the ionic current (model.md, Electrophysiology).
+G_s max(λ − 1, 0)/β_t, and f the load of the ionic current (docs/model.md, Electrophysiology).
 
 λ is constant per element and enters so: averaged to nodes first, it costs 5 ms of activation time at the apex of a
 5 mm mesh. φ_s enters through G's row sums, so that a uniform φ = φ_s is a rest state of the stretch current.
@@ -47,13 +47,13 @@ class Conduction:
     mass_matrix: str = parameter(
         "consistent",
         "1",
-        "consistent: waves too fast on coarse meshes; lumped: too slow",
+        "consistent: waves are too fast on coarse meshes; lumped: they are too slow",
         choices=("consistent", "lumped"),
     )
     ionic_current: str = parameter(
         "nodal",
         "1",
-        "nodal: taken at the nodes; quadrature: integrated by a rule of degree 2 (with the consistent mass only)",
+        "nodal: evaluated at the nodes; quadrature: integrated by a rule of degree 2 (with the consistent mass only)",
         choices=("nodal", "quadrature"),
     )
 

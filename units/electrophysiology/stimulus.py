@@ -1,4 +1,4 @@
-"""The initial stimulus: a potential set on the nodes in a box at the base (model.md, Electrophysiology)."""
+"""The initial stimulus: a potential set on the nodes in a box at the base (docs/model.md, Electrophysiology)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from ..errors import InvalidInput
 from ..mesh import Mesh
 from ..variable import VOLTAGE, parameter
 
-#: Depth in mm that stands for the seed's surface stimulus (Z > −1e-4 mm) when the depth is given as 0.
+#: Depth in mm that stands for a stimulus of the surface (Z > −1e-4 mm) when the depth is given as 0.
 _SURFACE = 1e-4
 
 #: Part of a mesh's nodes above which a stimulus is more than a place where a wave begins.
@@ -26,7 +26,7 @@ class Stimulus:
     stimulus_x_max_mm: float = parameter(31.0, "mm", "upper X limit of the stimulus box")
     stimulus_half_width_mm: float = parameter(10.0, "mm", "limit of |Y| of the stimulus box", above=0.0)
     stimulus_depth_mm: float = parameter(
-        2.0, "mm", "depth of the stimulus box below the base; 0: the base's nodes only", at_least=0.0
+        2.0, "mm", "depth of the stimulus box below the base; 0: only the nodes of the base", at_least=0.0
     )
 
     def nodes(self, points: FloatArray) -> np.ndarray:

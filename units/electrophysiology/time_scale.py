@@ -1,4 +1,4 @@
-"""The time scale β_t of the ionic model, by the expected time of activation (model.md, Electrophysiology)."""
+"""The time scale β_t of the ionic model, by the expected time of activation (docs/model.md, Electrophysiology)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class TimeScale:
     """β_t = β (1 − τ₀ (t_a − t₀)/(t₁ − t₀)): what activates later repolarises faster.
 
     The expected activation time t_a is linear in Z. `last_first` grows from the base to the apex, so that the last to
-    depolarise is the first to repolarise, as observed. `seed` is the printed t_a = t_apex (1 − Z/Z_apex), by which
+    depolarise is the first to repolarise, as observed. `as_printed` is t_a = t_apex (1 − Z/Z_apex), by which
     the base repolarises first: it runs and contradicts the text around it.
 
     An ionic model of dimensionless time takes β_t as its unit of time. One whose time constants are in ms has them as
@@ -29,13 +29,15 @@ class TimeScale:
     time_scale_reduction: float = parameter(0.55, "1", "tau_0, relative reduction of beta at t_a = t_1")
     time_scale_start_ms: float = parameter(12.0, "ms", "t_0, start of the reduction")
     time_scale_end_ms: float = parameter(75.0, "ms", "t_1, end of the reduction")
-    apex_activation_time_ms: float = parameter(50.0, "ms", "expected activation time across the height", at_least=0.0)
+    apex_activation_time_ms: float = parameter(
+        50.0, "ms", "t_apex, difference of the expected activation times of apex and base", at_least=0.0
+    )
     apex_z_mm: float = parameter(-70.0, "mm", "Z of the left ventricle's apex", below=0.0)
     activation_time_map: str = parameter(
         "last_first",
         "1",
-        "expected activation time along Z: last_first grows towards the apex, seed towards the base",
-        choices=("last_first", "seed"),
+        "expected activation time along Z: last_first grows towards the apex, as_printed towards the base",
+        choices=("last_first", "as_printed"),
     )
 
     def warnings(self, mesh: Mesh) -> Iterator[str]:
@@ -50,7 +52,7 @@ class TimeScale:
     def __call__(self, z: FloatArray) -> FloatArray:
         """β_t in ms at the heights `z` in mm; InvalidInput where it is not positive."""
         height = z / self.apex_z_mm
-        expected = self.apex_activation_time_ms * (1.0 - height if self.activation_time_map == "seed" else height)
+        expected = self.apex_activation_time_ms * (1.0 - height if self.activation_time_map == "as_printed" else height)
         span = self.time_scale_end_ms - self.time_scale_start_ms
         if span == 0.0:
             raise InvalidInput("time_scale_start_ms equals time_scale_end_ms; they have to differ")

@@ -2,24 +2,25 @@
 
     ∂Φ/∂t = ∇·(D∇Φ) − (β_φ/β_t)(Ĩ_e + Ĩ_m),   zero flux,   Ĩ_m = G_s max(λ − 1, 0)(φ − φ_s)
 
-Ĩ_e is that of the parameter `ionic_model` (`ionic`). The unit's state has φ, the model's states under their names, the
-activation times, and the last increments of φ, from which the solver guesses the next ones.
+Ĩ_e is the ionic current of the model that the parameter `ionic_model` chooses (`ionic`). The state of the unit contains
+φ, the states of the ionic model under their names, the activation times, and the last increments of φ, from which the
+solver extrapolates its next initial guess.
 
-Inputs: the stretch λ of the elements, held over a step or ramped (then each substep sees it as it is in its middle),
-and once the fibre directions. Outputs: the transmembrane potential and the activation time at the nodes, and the
-potential at three probes. Source: model.md, Electrophysiology.
+The inputs are the stretch λ of the elements, held over a step or varying linearly (each substep then uses its value in
+the middle of the substep), and the fibre directions, which are set once. The outputs are the transmembrane potential
+and the activation time at the nodes, and the potential at three probes. Source: docs/model.md, Electrophysiology.
 
-With `refine` the unit solves on a nested refinement of the scene's mesh: fibre and stretch are those of the element
-that a part lies in, potential and activation time are given at the scene's nodes.
+With `refine` the unit solves on a nested refinement of the mesh of the scene. A refined element has the fibre and the
+stretch of the element in which it lies; potential and activation time are given at the nodes of the scene's mesh.
 
-Linear elements; an implicit-explicit Runge–Kutta method of second order over substeps of equal length (`integration`),
-compiled where it can be (`compiled`). With `diffusion_step: explicit` diffusion is explicit as well (`explicit_step`),
-and limits the substep.
+The elements are linear. Time is integrated by an implicit-explicit Runge–Kutta method of second order, in substeps of
+equal length (`integration`), in compiled code where possible (`compiled`). With `diffusion_step: explicit` diffusion is
+explicit as well (`explicit_step`), which limits the length of the substep.
 
-How it fails: an element coarser than the wave front (≈ 8 mm) gives wrong speeds; a potential that is not finite any
-more, or a linear system that is not solved, ends the step with StepFailure. With `explicit_limit: ignored` substeps may
-be longer than what is explicit can follow: excited cells then rest at a potential that is none of theirs, with finite
-numbers for as long as it goes well (`stability.reaction_step`).
+How it fails: elements coarser than the wave front (≈ 8 mm) give wrong speeds. A potential that is no longer finite, or
+a linear system that cannot be solved, ends the step with StepFailure. With `explicit_limit: ignored` substeps may be
+longer than the explicit part permits: excited cells then rest at a potential that is not a solution of the model, and
+the numbers may still be finite (`stability.reaction_step`).
 """
 
 from collections.abc import Iterator
@@ -61,7 +62,7 @@ class PotentialScale:
         100.0, "mV", "beta_phi, potential range of the action potential", above=0.0, below=VOLTAGE["below"]
     )
     activation_potential_mV: float = parameter(
-        -20.0, "mV", "potential whose upward crossing is the activation", **VOLTAGE
+        -20.0, "mV", "potential whose first upward crossing counts as the activation", **VOLTAGE
     )
 
 
@@ -75,20 +76,20 @@ class Resolution:
     refine: int = parameter(
         0,
         "1",
-        "nested refinements of the mesh to solve on; each halves the elements",
+        "number of nested refinements of the mesh on which the unit solves; each halves the element size",
         at_least=0,
         refines=Refinement.MESH,
     )
     diffusion_step: str = parameter(
         "implicit",
         "1",
-        "implicit: diffusion and stretch current never limit the substep; explicit: Heun's method, which they limit",
+        "implicit: diffusion and stretch current do not limit the substep; explicit: Heun's method, in which they do",
         choices=("implicit", "explicit"),
     )
     explicit_limit: str = parameter(
         "enforced",
         "1",
-        "enforced: a longest_substep_ms that what is explicit cannot follow is refused; ignored: it runs, and fails",
+        "enforced: refuses a longest_substep_ms above the stability limit of the explicit part; ignored: accepts it",
         choices=("enforced", "ignored"),
     )
 
@@ -104,7 +105,7 @@ class Resolution:
 
 
 class Electrophysiology(Unit):
-    """Monodomain with stretch-activated current on linear elements."""
+    """Monodomain equation with a stretch-activated current, on linear elements."""
 
     name = "electrophysiology"
     interpolates = True

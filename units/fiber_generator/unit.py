@@ -1,14 +1,15 @@
-"""The fibre generator unit: static fibre and sheet directions from the anatomy (model.md, Fibre generator).
+"""The fibre generator unit: static fibre and sheet directions from the anatomy (docs/model.md, Fibre generator).
 
 The sheet direction s₀ points through the wall, from endocardium to epicardium. The fibre lies in the plane normal to
-it, at the angle θ from the horizontal, which runs linearly through the wall between its two ends and to zero at the
-apex. Both are computed once, at initialisation, and are constant per element; the relative distance β from the
-epicardium is taken at the nodes, where it is 0 and 1 on the two surfaces, and averaged to the elements.
+s₀, at the angle θ from the horizontal. Through the wall, θ varies linearly between its values at the two surfaces, and
+towards the apex it decreases linearly to zero. Both directions are computed once, at the initialisation, and are
+constant per element. The relative distance β from the epicardium is computed at the nodes, where it is 0 and 1 on the
+two surfaces, and averaged over the nodes of each element.
 
-In scenes of points, lines and triangles there is no wall, and fibres run along x.
+In scenes of points, lines and triangles there is no wall, and fibres are parallel to x.
 
-How it fails: a mesh without the named boundaries, or with elements through whose wall no direction can be found, is
-refused with InvalidInput.
+How it fails: a mesh without the named boundaries is refused with InvalidInput, and so is a mesh with elements for which
+no direction through the wall can be found.
 """
 
 from collections.abc import Iterator
@@ -19,11 +20,11 @@ import numpy as np
 from ..arrays import FloatArray
 from ..mesh import Mesh
 from ..mesh.frame import apex_warnings
+from ..mesh.transmural import transmural_direction, wall_distance
 from ..mesh.wall import wall_of
 from ..snapshot import State
 from ..unit import Unit
 from ..variable import Causality, Location, Variable, parameter
-from .transmural import transmural_direction, wall_distance
 
 #: Sum of the two wall distances in mm that is zero but for rounding.
 _TOUCHING_MM = 1e-9
@@ -76,7 +77,7 @@ def _along_x(elements: int) -> dict[str, FloatArray]:
 
 
 class FiberGenerator(Unit):
-    """Rule-based fibres; it has no inputs and a step changes nothing."""
+    """Rule-based fibres, without inputs; a step changes nothing."""
 
     name = "fiber_generator"
     groups = (HelixRule,)

@@ -1,12 +1,13 @@
-"""The local mechanics unit: every element in equilibrium by itself, without a mesh between them.
+"""The local mechanics unit: every element is in equilibrium by itself and does not interact with its neighbours.
 
     2∂W/∂C + s_a (a₀⊗a₀ + 0.4 s₀⊗s₀ + 0.4 n₀⊗n₀) = 0 in the axes of fibre, sheet and normal (`local_equilibrium`)
 
-The same strain energy and variables as finite-element mechanics (`unit`), in every dimension. `free`: each element
-contracts as a cube that nothing holds; `isometric`: its fibre keeps its length and the two other directions are free.
-On a homogeneous cube that is free to contract, finite elements find the same. Source: model.md, Mechanics.
+The strain energy and the variables are those of finite-element mechanics (`unit`), for scenes of any dimension. With
+`free`, each element contracts as a cube without any support; with `isometric`, its fibre keeps its length and the two
+other directions are free. For a homogeneous cube without support, finite elements give the same result. Source:
+docs/model.md, Mechanics.
 
-How it fails: where no equilibrium is found, not even in many small steps of active stress, the step ends with
+How it fails: if no equilibrium is found, not even in many small increments of the active stress, the step ends with
 StepFailure.
 """
 
@@ -20,7 +21,7 @@ from ..differentiable import Differentiable
 from ..errors import StepFailure
 from ..snapshot import State
 from ..taken import Taken
-from ..variable import Causality, Location, parameter
+from ..variable import Causality, Location, Record, parameter
 from .laws.registry import LAWS, Material
 from .loads.active_stiffness import Stabilization, StretchDependence
 from .loads.active_stress import ActiveShares
@@ -51,7 +52,7 @@ class Hold:
     hold: str = parameter(
         "free",
         "1",
-        "free: the fibre shortens as it likes; isometric: it keeps its length",
+        "free: the fibre shortens freely; isometric: it keeps its length",
         choices=("free", "isometric"),
     )
 
@@ -62,7 +63,15 @@ class LocalMechanics(Differentiable):
     name = "local_mechanics"
     memoryless = True
     groups = (Material, *LAWS, ActiveShares, Stabilization, Hold)
-    fields = tuple(replace(variable, depends_on=_FOLLOWS.get(variable.name, ())) for variable in Mechanics.fields)
+    fields = tuple(
+        replace(
+            variable,
+            depends_on=_FOLLOWS.get(variable.name, ()),
+            # There is no wall whose motion were worth a column.
+            record=Record.NOTHING if variable.recorded_with else variable.record,
+        )
+        for variable in Mechanics.fields
+    )
 
     def prepare(self) -> None:
         """Set the equilibrium up."""

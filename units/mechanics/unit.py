@@ -4,14 +4,16 @@
 
 Displacement fixed on `base`, no inertia. Inputs: the active stress at the nodes, where it depends on the stretch its
 stiffness and the stretch it holds at (`loads/active_stiffness`), the pressures in the cavities, and once fibre and
-sheet. Outputs: stretch per element, displacement, the volumes of the cavities, and the apex's uplift.
-Other passive laws are chosen by `material`, quadratic displacements by `element_order`. Source: model.md, Mechanics.
+sheet. Outputs: stretch per element, displacement, the volumes of the cavities, the apex's uplift, and the twist and
+mean strains of the left ventricle's wall (`wall_motion`).
+Other passive laws are chosen by `material`, quadratic displacements by `element_order`. Source: docs/model.md,
+Mechanics.
 
 Loose tolerances are dangerous here: resting tissue fires by itself where λ − 1 > 3.3e-5.
 
 How it fails: where no equilibrium is found, not even with the change of the loads cut into 64 steps, the step ends
-with StepFailure. With the energy as the seed prints it (`neo_hooke_log_sign: seed`) the undeformed tissue is not
-stress-free, so that there is no state to start from: the initialisation ends with StepFailure.
+with StepFailure. With the energy as printed in the source document (`neo_hooke_log_sign: as_printed`) the undeformed
+tissue is not stress-free, so that there is no state to start from: the initialisation ends with StepFailure.
 """
 
 from collections.abc import Callable, Iterator
@@ -46,6 +48,7 @@ from .solvers.equilibrium import Convergence, Equilibrium
 from .solvers.factored import Factored
 from .solvers.predictor import MEMORY, Predictor
 from .tangent import Tangent
+from .wall_motion import WallMotion, wall_outputs
 
 _MPA_PER_KPA = 1e-3
 _ML_PER_MM3 = 1e-3
@@ -64,6 +67,8 @@ _FOLLOWS_ALL = (
     "fiber",
     "sheet",
 )
+
+_OF_THE_WALL = tuple(variable.name for variable in wall_outputs(_FOLLOWS_ALL))
 
 
 class Mechanics(Differentiable):
@@ -86,7 +91,7 @@ class Mechanics(Differentiable):
             "reference_stretch",
             Causality.INPUT,
             "1",
-            "stretch at which active stress and active stiffness hold; 0: the unit's own at the begin of the step",
+            "stretch at which active stress and active stiffness apply; 0: the value at the beginning of the step",
             Location.ELEMENT,
             needs="stabilization",
         ),
@@ -116,6 +121,7 @@ class Mechanics(Differentiable):
                 ("apex_uplift", "mm", "Z displacement of the lowest node"),
             )
         ),
+        *wall_outputs(_FOLLOWS_ALL),
     )
 
     @classmethod
@@ -167,6 +173,7 @@ class Mechanics(Differentiable):
         self._predictor = Predictor(self._solid.loads, mesh.nodes, float(np.sqrt(mesh.nodes)))
         self._stabilization = self.parameters(Stabilization).stabilization
         self._apex = int(mesh.points[:, 2].argmin())
+        self._wall_motion = WallMotion(mesh, space)
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """The undeformed state, brought to equilibrium with the initial loads."""
@@ -176,8 +183,9 @@ class Mechanics(Differentiable):
                 f"the undeformed tissue carries a stress of {stress:.3g} MPa although nothing loads it: the strain "
                 "energy has no stress-free state to start from"
                 + (
-                    ". That is the energy as the seed prints it, with + mu ln J; use neo_hooke_log_sign: stress_free"
-                    if self.parameters(NeoHooke).neo_hooke_log_sign == "seed"
+                    ". That is the energy with + mu ln J, as printed in the source document; use "
+                    "neo_hooke_log_sign: stress_free"
+                    if self.parameters(NeoHooke).neo_hooke_log_sign == "as_printed"
                     else ""
                 )
             )
@@ -228,7 +236,7 @@ class Mechanics(Differentiable):
         return result
 
     def output(self, name: str, state: State) -> FloatArray:
-        """Stretch (elements,), displacement (nodes, 3) in mm, volumes in ml and uplift in mm (both scalars)."""
+        """Stretch (elements,), displacement (nodes, 3) in mm, volumes in ml, uplift in mm and more scalars."""
         displacement = state["displacement"]
         if name == "displacement":
             return displacement[: self.mesh.nodes]
@@ -236,6 +244,8 @@ class Mechanics(Differentiable):
             return frozen(self._solid.stretch(displacement))
         if name == "apex_uplift":
             return frozen(displacement[self._apex, 2])
+        if name in _OF_THE_WALL:
+            return frozen(self._wall_motion.value(name, displacement))
         if name not in self._cavities:
             return frozen(0.0)
         return frozen(_ML_PER_MM3 * self._cavities[name].volume(displacement))
@@ -262,6 +272,8 @@ class Mechanics(Differentiable):
         }
         # A pressure of 1 MPa has the potential −V.
         matrices |= {name: csr_matrix(-_ML_PER_MM3 * force) for name, force in zip(self._cavities, forces, strict=True)}
+        for name in _OF_THE_WALL:
+            matrices[name] = csr_matrix(at_nodes.T @ self._wall_motion.gradient(name, displacement).ravel())
         absent = _PRESSURES.keys() - self._cavities.keys()
         matrices |= {name: csr_matrix((1, solid.unknowns)) for name in absent}
         return MechanicsDerivative(

@@ -2,7 +2,7 @@
 
 Forward Euler multiplies it by 1 − ε H, so that the faster rate ε₁ limits the step H to 2/ε₁; the exact step by
 e^(−ε H), which is below 1 for any step. Between the rates ε₀ at rest and ε₁ in depolarised tissue, ε takes all values,
-so that one of the two is the worst. The seed's delay function has a negative rate where the tissue is depolarised.
+so that one of the two is the worst. The printed delay function has a negative rate where the tissue is depolarised.
 """
 
 from math import exp, inf
@@ -24,7 +24,7 @@ class ActiveStressStep(Theory):
         """See Theory."""
         parameters = coupled.only("active_stress").parameters
         rest, depolarised = float(parameters["slow_rate_per_ms"]), float(parameters["fast_rate_per_ms"])
-        if parameters["delay_function"] == "seed":
+        if parameters["delay_function"] == "as_printed":
             depolarised = 2.0 * rest - depolarised
         decays = [rate * coupled.step_ms for rate in (rest, depolarised)]
         if parameters.get("time_integration") == "forward_euler":

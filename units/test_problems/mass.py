@@ -1,16 +1,18 @@
-"""A damped mass on a spring, pulled through another spring and damper: one half of the two-mass oscillator.
+"""A damped mass on a spring, coupled to another mass through a spring and a damper: half of the two-mass oscillator.
 
     m x″ + (c + c_c) x′ + (k + k_c) x = F_in + k_c x_in + c_c v_in,   F = k_c (x − x_in) + c_c (x′ − v_in)
 
-The benchmark of co-simulation (Busch 2012; Schweizer, Li & Lu 2015). Two of them are coupled in two ways. By force and
-displacement: the second is given x and v of the first and returns F, with which the coupling pulls at the first
-(`second.F -> first.F_in`); the first has no k_c and c_c. By displacement and displacement: both have k_c and c_c, and
-each is given the other's x and v. FMUs elsewhere that have the same equation and names can take its place.
+The two-mass oscillator is the benchmark of co-simulation (Busch 2012; Schweizer, Li & Lu 2015). Two masses are coupled
+in one of two ways. By force and displacement: the second mass receives x and v of the first and returns F, the force of
+the coupling on the first (`second.F -> first.F_in`); the first mass has no k_c and c_c. By displacement and
+displacement: both masses have k_c and c_c, and each receives x and v of the other. An FMU from elsewhere that has the
+same equation and names can replace a mass.
 
-The step is exact for inputs that are held over it, or run along a line: the exponential of the matrix that the equation
-and its load make together. Numbers are in any units of measure that go together, with the second as that of time.
+The step is exact for inputs that are held or vary linearly over it; it uses the exponential of the matrix that contains
+the equation and its load. The numbers may be in any consistent units of measure with the second as that of time.
 
-How it fails: it does not. What grows without bound is the coupling's affair, until it is no number any more.
+How it fails: the unit itself does not fail. If the coupling is unstable, the values grow until they are no longer
+finite numbers.
 """
 
 from dataclasses import dataclass
@@ -36,8 +38,8 @@ class Suspension:
     m: float = parameter(1.0, "1", "mass", above=0.0)
     k: float = parameter(0.0, "1", "stiffness of the spring that holds the mass", at_least=0.0)
     c: float = parameter(0.0, "1", "damping of the mass", at_least=0.0)
-    k_c: float = parameter(0.0, "1", "stiffness of the spring to where x_in is", at_least=0.0)
-    c_c: float = parameter(0.0, "1", "damping of the difference to v_in", at_least=0.0)
+    k_c: float = parameter(0.0, "1", "stiffness of the spring of the coupling", at_least=0.0)
+    c_c: float = parameter(0.0, "1", "damping of the coupling", at_least=0.0)
 
     def load(self, force: FloatArray, position: FloatArray, velocity: FloatArray) -> FloatArray:
         """The force that the inputs F_in, x_in and v_in exert, of any shape."""

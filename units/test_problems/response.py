@@ -1,16 +1,17 @@
-"""A number that answers another one: at once, with a delay, or to its rate. Two of them make the simplest loops.
+"""A number that responds to another one: at once, with a delay, or to its rate. Two of them form the simplest loops.
 
     y = w + ρ u′,   w = g u + b   or, with a delay,   w′ = ε (g u + b − w)
 
-g is `gain`, b `offset`, ε `delay_rate_per_ms` and ρ `rate_gain_ms`; u′ is the difference of the input over a step by
-the step's length. Two in a loop show what an explicit coupling does with a gain, whatever its step; with a delay, which
-stabilises short steps; and with a dependence on the rate, which long steps stabilise: the loop of active stress and
-mechanics in numbers (Regazzoni & Quarteroni 2021). The step is exact for an input that is held over it, or runs along
-a line.
+g is `gain`, b `offset`, ε `delay_rate_per_ms` and ρ `rate_gain_ms`; u′ is the change of the input over a step divided
+by the length of the step. Two of these units in a loop show three properties of explicit coupling: the effect of a
+gain, which does not depend on the step; the effect of a delay, which stabilises short steps; and the effect of a
+dependence on the rate, which long steps stabilise. This is the loop of active stress and mechanics, reduced to numbers
+(Regazzoni & Quarteroni 2021). The step is exact for an input that is held or varies linearly over it.
 
-With a `disturbance` the output is off at the start, so that there is something to grow or to decay.
+With a `disturbance`, the output deviates at the start, so that there is a deviation that grows or decays.
 
-How it fails: it does not. What grows without bound is the coupling's affair, until it is no number any more.
+How it fails: the unit itself does not fail. If the coupling is unstable, the values grow until they are no longer
+finite numbers.
 """
 
 from dataclasses import dataclass
@@ -57,8 +58,8 @@ class Response(Differentiable):
     interpolates = True
     groups = (Law,)
     fields = (
-        Variable("u", Causality.INPUT, "1", "the number that is followed"),
-        Variable("y", Causality.OUTPUT, "1", "the answer", depends_on=("u",), record=Record.VALUE),
+        Variable("u", Causality.INPUT, "1", "the number that the output responds to"),
+        Variable("y", Causality.OUTPUT, "1", "the response", depends_on=("u",), record=Record.VALUE),
     )
 
     def prepare(self) -> None:

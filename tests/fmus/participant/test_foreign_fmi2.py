@@ -241,7 +241,7 @@ def test_steps_that_fail_in_other_peoples_fmus(mode: float, message: str, foreig
 
 
 def test_messages_are_not_mixed_up_with_those_of_our_fmus(fmus: dict, foreign: dict, tiny: Mesh, ready: Join) -> None:
-    own = ready(fmus["active_stress"], "own", delay_function="seed")
+    own = ready(fmus["active_stress"], "own", delay_function="as_printed")
     stranger = ready(foreign["Failing"], "stranger")
     own.set("potential", np.full(tiny.nodes, 10.0))
     stranger.set("mode", np.array(3.0))

@@ -109,7 +109,7 @@ def test_what_get_returns_is_the_callers(packed: dict, cases: dict, ready: Join)
 
 
 def test_a_failing_step_says_why(packed: dict, tiny: Mesh, ready: Join) -> None:
-    participant = ready(packed["active_stress"], delay_function="seed")
+    participant = ready(packed["active_stress"], delay_function="as_printed")
     participant.set("potential", np.full(tiny.nodes, 20.0))
     for _ in range(2):
         with pytest.raises(ParticipantError, match=r"at node 0 \(potential 20.0 mV\).*use delay_function: gompertz$"):
@@ -130,7 +130,7 @@ def test_a_mesh_without_boundaries_is_the_persons_error(
 
 
 def test_no_state_to_start_from_is_not_the_persons_error(packed: dict, cases: dict, join: Join) -> None:
-    participant = join(packed["mechanics"], neo_hooke_log_sign="seed")
+    participant = join(packed["mechanics"], neo_hooke_log_sign="as_printed")
     participant.begin()
     for name, values in cases["mechanics"].first().items():
         participant.set(name, values)
@@ -174,8 +174,8 @@ def test_not_finite_is_refused(packed: dict, tiny: Mesh, ready: Join) -> None:
 
 
 def test_messages_reach_the_participant_they_belong_to(packed: dict, tiny: Mesh, ready: Join) -> None:
-    one = ready(packed["active_stress"], "one", delay_function="seed")
-    other = ready(packed["active_stress"], "other", delay_function="seed")
+    one = ready(packed["active_stress"], "one", delay_function="as_printed")
+    other = ready(packed["active_stress"], "other", delay_function="as_printed")
     for participant, potential in ((one, 10.0), (other, 20.0)):
         participant.set("potential", np.full(tiny.nodes, potential))
     for _ in range(2):

@@ -197,7 +197,7 @@ _TOO_MUCH, _SOUND = [20.0] * 16, [-79.0] * 16
 
 def _bring(driver: Any, state: str) -> None:
     """To one of the states."""
-    driver.parameterize({"delay_function": "seed"})
+    driver.parameterize({"delay_function": "as_printed"})
     if state == "instantiated":
         return
     driver.setup(0.0, 1.0)

@@ -125,7 +125,7 @@ def test_a_step_that_was_refused_leaves_them_for_the_next(fmus: dict, drive: Mak
 def test_a_discarded_step_leaves_them_for_another_try(running: Make, ends: _Ends, tiny: Mesh) -> None:
     driver, other = running("active_stress"), running("active_stress")
     for one in (driver, other):
-        one.start({"delay_function": "seed"}, {"potential": np.full(tiny.nodes, -79.0)})
+        one.start({"delay_function": "as_printed"}, {"potential": np.full(tiny.nodes, -79.0)})
     ends.values = {"potential": np.full(tiny.nodes, 80.0)}
     assert ends.step(driver, 0.0, 1e-3, {"potential": np.full(tiny.nodes, -79.0)}) == 2
     assert driver.reached() == 0.0

@@ -42,7 +42,7 @@ def test_terminate_free_and_instantiate_again(case: Any, make: Make) -> None:
 def test_a_failing_step_is_discarded_and_changes_nothing(make: Make, tiny: Mesh) -> None:
     driver, other = make("active_stress"), make("active_stress")
     for one in (driver, other):
-        one.start({"delay_function": "seed"}, {})
+        one.start({"delay_function": "as_printed"}, {})
         assert one.step(0.0, 1e-3, {"potential": np.full(tiny.nodes, -79.0)}) == 0
     before = driver.outputs()
     depolarised = np.full(tiny.nodes, -79.0)

@@ -43,7 +43,7 @@ _ANY: dict[str, tuple[Mistake, str]] = {
     ),
     "infinite": (lambda d: d.set("potential", np.full(16, np.inf)), r"'potential' .* not finite at node \[0\]"),
     "a late parameter": (lambda d: d.parameterize({"length_dependence": 0.1}), "'active_stress' is initialized"),
-    "a late choice": (lambda d: d.parameterize({"delay_function": "seed"}), "'active_stress' is initialized"),
+    "a late choice": (lambda d: d.parameterize({"delay_function": "as_printed"}), "'active_stress' is initialized"),
     "what it computes": (lambda d: d.write("String", d.references("implementation"), ["x"]), "'implementation' is"),
     "call order": (lambda d: d.enter(), "this call needs it to be"),
     "one right, one wrong": (
@@ -79,7 +79,7 @@ _OF_FMI_3: dict[str, tuple[Mistake, str]] = {
     ),
     "the time": (lambda d: d.set("time", [1.0]), "'time'"),
     "too many texts": (
-        lambda d: d.write("String", d.references("delay_function"), ["gompertz", "seed"]),
+        lambda d: d.write("String", d.references("delay_function"), ["gompertz", "as_printed"]),
         "2 texts were given for 1 variables",
     ),
 }
@@ -178,7 +178,7 @@ def test_a_whole_number_that_cannot_be_read_is_no_plausible_one(make: Make) -> N
 @pytest.mark.parametrize(
     ("unit", "parameter", "value", "words"),
     [
-        ("active_stress", "delay_function", "gompert", "'gompert'; choose one of: gompertz, seed"),
+        ("active_stress", "delay_function", "gompert", "'gompert'; choose one of: gompertz, as_printed"),
         ("active_stress", "delay_function", "100%", "'delay_function' is '100%'; choose one of: gom"),
         ("active_stress", "slow_rate_per_ms", -0.1, "'slow_rate_per_ms' is -0.1; expected .* > 0"),
         ("active_stress", "slow_rate_per_ms", float("nan"), "'slow_rate_per_ms' is nan"),

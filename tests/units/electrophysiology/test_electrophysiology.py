@@ -128,7 +128,7 @@ def test_time_scale_by_hand() -> None:
     heights = np.array([0.0, -35.0, -70.0])
     expected = 12.9 * (1.0 - 0.55 * (np.array([0.0, 25.0, 50.0]) - 12.0) / 63.0)
     np.testing.assert_allclose(TimeScale()(heights), expected, rtol=1e-14)
-    np.testing.assert_allclose(TimeScale(activation_time_map="seed")(heights), expected[::-1], rtol=1e-14)
+    np.testing.assert_allclose(TimeScale(activation_time_map="as_printed")(heights), expected[::-1], rtol=1e-14)
 
 
 def test_time_scale_that_is_not_positive_is_refused() -> None:
@@ -142,18 +142,18 @@ def test_time_scale_that_is_not_positive_is_refused() -> None:
 
 
 def test_last_to_depolarise_is_first_to_repolarise(box, started, along) -> None:
-    # Everything fires at once; the seed's printed map turns the order of repolarisation round.
+    # Everything fires at once; the printed map turns the order of repolarisation round.
     column = box([0.0, 35.0], [0.0, 35.0], [-70.0, -35.0, 0.0])
     top, bottom = column.points[:, 2] == 0.0, column.points[:, 2] == -70.0
     ends = {}
-    for kind in ("last_first", "seed"):
+    for kind in ("last_first", "as_printed"):
         parameters = _EVERYWHERE | {"activation_time_map": kind, "longest_substep_ms": 1.0}
         del parameters["time_scale_reduction"]
         unit = started(Electrophysiology, column, parameters, fiber=along(column, (1, 0, 0)))
         unit.do_step(0.0, 0.33)
         ends[kind] = unit.get("potential")[top].mean() - unit.get("potential")[bottom].mean()
     assert ends["last_first"] > 20.0
-    assert ends["seed"] < -20.0
+    assert ends["as_printed"] < -20.0
 
 
 # --- diffusion -----------------------------------------------------------------------------------------------------
@@ -378,7 +378,7 @@ def _firing_stretch() -> float:
 
 @each_variant
 def test_resting_tissue_fires_by_itself_just_above_the_balance_and_not_below(variant: str, box, started, along) -> None:
-    # Independent computation (model.md, Numbers to verify against): λ − 1 > 3.3e-5 with r = 0.
+    # Independent computation (docs/model.md, Numbers to verify against): λ − 1 > 3.3e-5 with r = 0.
     firing = _firing_stretch()
     assert firing == pytest.approx(3.3e-5, abs=0.1e-5)
     grain = box([0.0, 1.0], [0.0, 1.0], [-1.0, 0.0])

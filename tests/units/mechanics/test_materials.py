@@ -16,7 +16,7 @@ _STEPS = (4e-3, 2e-3, 1e-3)
 
 _LAWS = {
     "neo_hooke": NeoHooke(),
-    "neo_hooke as the seed prints it": NeoHooke(neo_hooke_log_sign="seed"),
+    "neo_hooke as printed": NeoHooke(neo_hooke_log_sign="as_printed"),
     "fiber": HolzapfelFiber(),
     "guccione": Guccione(),
     "guccione, isotropic": Guccione(0.01, guccione_fiber=1.0, guccione_transverse=1.0, guccione_shear=1.0),
@@ -122,7 +122,7 @@ def test_energies_are_zero_and_stress_free_at_rest() -> None:
 
 
 def test_seeds_sign_carries_a_stress_of_two_shear_moduli_at_rest() -> None:
-    stress = NeoHooke(neo_hooke_log_sign="seed").stress(_at(np.eye(3)))[0]
+    stress = NeoHooke(neo_hooke_log_sign="as_printed").stress(_at(np.eye(3)))[0]
     np.testing.assert_allclose(stress, 2.0 * 0.2 * np.eye(3), rtol=1e-15)
 
 

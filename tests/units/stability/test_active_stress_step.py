@@ -40,5 +40,5 @@ def test_the_exact_step_is_stable_whatever_its_length(step_ms: float, setting: A
 def test_the_seeds_delay_function_is_unstable_at_any_step(setting: Any) -> None:
     # As printed its rate is -0.8/ms in depolarised tissue.
     for step_ms in (0.01, 1.0, 100.0):
-        assert _amplification(setting, step_ms, delay_function="seed") == pytest.approx(np.exp(0.8 * step_ms))
-    assert _amplification(setting, 1e5, delay_function="seed") == np.inf
+        assert _amplification(setting, step_ms, delay_function="as_printed") == pytest.approx(np.exp(0.8 * step_ms))
+    assert _amplification(setting, 1e5, delay_function="as_printed") == np.inf

@@ -20,7 +20,7 @@ class Elements:
     element_order: int = parameter(
         1,
         "1",
-        "polynomial order of the displacement: 1, or 2 where tissue is nearly incompressible (dearer by twenty)",
+        "polynomial order of the displacement: 1, or 2 for nearly incompressible tissue (some twenty times as slow)",
         at_least=1,
         below=3,
     )

@@ -1,8 +1,8 @@
-"""The isotropic part of the strain energy: a compressible neo-Hookean solid (model.md, Mechanics).
+"""The isotropic part of the strain energy: a compressible neo-Hookean solid (docs/model.md, Mechanics).
 
     W = ½μ(I₁ − 3) ∓ μ ln J + ½λ_L (ln J)²
 
-`stress_free` has the minus sign: S = μ(1 − C⁻¹) + λ_L ln J C⁻¹ vanishes at F = 1. `seed` has the printed plus sign,
+`stress_free` has the minus sign: S = μ(1 − C⁻¹) + λ_L ln J C⁻¹ vanishes at F = 1. `as_printed` has the plus sign,
 by which the undeformed tissue carries the stress 2μ and has no equilibrium to start from.
 """
 
@@ -27,13 +27,13 @@ class NeoHooke:
     neo_hooke_log_sign: str = parameter(
         "stress_free",
         "1",
-        "sign of mu ln J: stress_free (minus), or seed (plus, as printed: no stress-free state)",
-        choices=("stress_free", "seed"),
+        "sign of mu ln J: stress_free (minus), or as_printed (plus: no stress-free state)",
+        choices=("stress_free", "as_printed"),
     )
 
     @property
     def _log_modulus(self) -> float:
-        return -self.shear_modulus_MPa if self.neo_hooke_log_sign == "seed" else self.shear_modulus_MPa
+        return -self.shear_modulus_MPa if self.neo_hooke_log_sign == "as_printed" else self.shear_modulus_MPa
 
     @property
     def modulus(self) -> float:

@@ -26,7 +26,7 @@ class Material:
     material: str = parameter(
         "neo_hooke_with_fibers",
         "1",
-        "passive material, the sum of its laws; parameters of laws that it has not do nothing",
+        "passive material, a sum of laws; parameters of laws that are not part of it have no effect",
         choices=tuple(MATERIALS),
     )
 

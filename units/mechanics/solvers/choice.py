@@ -24,7 +24,7 @@ class LinearSolver:
         "auto",
         "1",
         "supernodal: factors by rslab; superlu: factors by SciPy; multigrid: conjugate gradients with pyamg, for large "
-        "meshes; auto: the first of them that is installed and fits",
+        "meshes; auto: the first of these that is installed and suits the size of the mesh",
         choices=("auto", "supernodal", "superlu", "multigrid"),
     )
 

@@ -40,8 +40,8 @@ class Convergence:
     safeguards: str = parameter(
         "on",
         "1",
-        "on: stale factors first, then a line search, then increments of the loads; off: Newton's method alone with "
-        "full steps from the last equilibrium, there to show what the safeguards are for",
+        "on: earlier factors first, then a line search, then load increments; off: Newton's method alone with full "
+        "steps from the last equilibrium, to demonstrate why the safeguards are needed",
         choices=("on", "off"),
     )
 
