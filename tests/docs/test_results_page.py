@@ -6,8 +6,9 @@ from pathlib import Path
 
 import h5py
 import pytest
-from cardiac_cosim.orchestrator.simulation import simulate
+from cardiac_cosim.cli.app import app
 from doc_blocks import ROOT
+from typer.testing import CliRunner
 
 _PAGE = (ROOT / "docs" / "reference" / "results.md").read_text(encoding="utf-8")
 
@@ -20,16 +21,20 @@ _RARE = {
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory, small_heart_file: Path) -> list[Path]:
-    """A run with iterated steps, and one with adaptive ones, both with figures."""
-    scenario = ROOT / "scenarios" / "baseline.yaml"
-    settings = {"scene": {"mesh": str(small_heart_file)}, "run.participants": "native", "run.stop_ms": 10}
-    stimulus = {"units.electrophysiology.parameters": {"stimulus_depth_mm": 5}}
-    iterated = {"coupling.iterate": {"converge": {"stretch": {"relative": 1e-2}}}}
-    adaptive = {"coupling.adaptive": {"tolerance": 0.1}}
+    """A run with iterated steps and all that is drawn of it, and one with adaptive steps."""
+    sets = [f"scene={{mesh: {small_heart_file}}}", "run.participants=native", "run.stop_ms=10"]
+    sets.append("units.electrophysiology.parameters={stimulus_depth_mm: 5}")
+    iterated, adaptive = (
+        "coupling.iterate={converge: {stretch: {relative: 1e-2}}}",
+        "coupling.adaptive={tolerance: 0.1}",
+    )
     folders = []
-    for name, changes, figures in (("iterated", iterated, True), ("adaptive", adaptive, False)):
+    for name, change, options in (("iterated", iterated, ()), ("adaptive", adaptive, ("--no-figures",))):
         folders.append(tmp_path_factory.mktemp(name))
-        simulate(scenario, settings | stimulus | changes, folders[-1], figures=figures)
+        assignments = [f"--set={each}" for each in (*sets, change)]
+        words = ["run", str(ROOT / "scenarios" / "baseline.yaml"), "--output", str(folders[-1]), *assignments, *options]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, done.output
     return folders
 
 
