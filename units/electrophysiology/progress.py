@@ -62,7 +62,7 @@ class Limits:
     def too_large(self, node: int, phi: float) -> StepFailure:
         """The failure at a node beyond what a cell reaches."""
         return StepFailure(
-            f"the dimensionless potential at node {node} is {phi:.3g}, which no cell reaches; lower "
+            f"the dimensionless potential at node {node} is {phi:.3g}, outside the range of a cell; lower "
             "longest_substep_ms, or check the parameters of the ionic model"
         )
 
@@ -70,6 +70,6 @@ class Limits:
 def unsolved() -> StepFailure:
     """The failure of conjugate gradients."""
     return StepFailure(
-        f"a step of the potential was not solved in {SOLVER_ITERATIONS} iterations of conjugate gradients; look for "
+        f"conjugate gradients did not converge in {SOLVER_ITERATIONS} iterations in a step of the potential; look for "
         "degenerate elements in the mesh or take a smaller longest_substep_ms"
     )

@@ -94,4 +94,4 @@ def _looped(loop: Callable[[FloatArray], FloatArray], right: FloatArray) -> Floa
 
 
 def _singular(reason: str) -> StepFailure:
-    return StepFailure(f"the equilibrium has no derivative by its loads there ({reason})")
+    return StepFailure(f"the equilibrium has no derivative with respect to its loads there ({reason})")

@@ -82,7 +82,7 @@ class Mechanics(Differentiable):
             "active_stiffness",
             Causality.INPUT,
             "kPa",
-            "derivative of the active stress by the stretch",
+            "derivative of the active stress with respect to the stretch",
             Location.NODE,
             needs="stabilization",
         ),

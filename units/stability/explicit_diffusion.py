@@ -51,7 +51,7 @@ class ExplicitDiffusion(Theory):
     def fastest_mode(self, coupled: Coupled) -> float:
         """λ_max in 1/ms; InvalidInput without a scene, or without fibres where diffusion follows them."""
         if coupled.mesh is None:
-            raise InvalidInput("the theory is of tissue in a scene; give the scenario one")
+            raise InvalidInput("the theory applies to tissue in a scene; add a `scene` to the scenario")
         setting, mesh = coupled.only("electrophysiology"), coupled.mesh()
         conduction, time_scale = setting.group(Conduction), setting.group(TimeScale)
         levels = setting.group(Resolution).refine

@@ -42,11 +42,11 @@ def linear_masses(coupled: Coupled) -> dict[str, LinearUnit]:
     chosen = {name: unit.group(Suspension) for name, unit in coupled.units.items() if unit.kind in ("mass", "fmu")}
     if len(chosen) != 2:
         raise InvalidInput(
-            f"the theory is of two masses, units or FMUs with m, k, c, k_c and c_c, not of {len(chosen)}"
+            f"the theory applies to two masses, units or FMUs with m, k, c, k_c and c_c, not to {len(chosen)}"
         )
     free = [name for name, suspension in chosen.items() if not (suspension.k_c or suspension.c_c)]
     if len(free) == 2:
-        raise InvalidInput("the theory is of two masses that are coupled: give k_c or c_c to one of them, or to both")
+        raise InvalidInput("the theory applies to two coupled masses: give k_c or c_c to one of them, or to both")
     first, second = chosen
     other = {first: second, second: first}
     return {

@@ -45,7 +45,7 @@ class LinearSolver:
         """A sentence for a person where SciPy has to stand in for a faster package."""
         if self.linear_solver == "auto" and not _installed("rslab"):
             yield (
-                "rslab is not installed, so that SciPy's SuperLU factorises the stiffness, several times slower; "
+                "rslab is not installed, so SciPy's SuperLU factorises the stiffness, several times slower; "
                 "install it (pip install rslab)"
             )
 
