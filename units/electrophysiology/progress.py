@@ -1,4 +1,4 @@
-"""What a step of the monodomain equation moves, and what stops it."""
+"""The state that a step of the monodomain equation advances, and the failures of a step."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ SOLVER_ITERATIONS = 1000
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the equation stands.
+    """The present state of the monodomain equation.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ class Progress:
         In ms, shape (nodes,).
     increments:
         By how much φ grew from the begin of a substep to its middle stage, in the last substep and in the one before,
-        then the same from begin to end; shape (4, nodes). They foretell the next substep's, from which conjugate
-        gradients start.
+        then the same from begin to end; shape (4, nodes). Those of the next substep are extrapolated from them, as
+        the first guess of conjugate gradients.
     substep_ms:
         Length of the substep that the increments are of; 0 at the start.
     """

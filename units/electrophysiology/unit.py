@@ -94,7 +94,7 @@ class Resolution:
     )
 
     def substeps(self, step_ms: float) -> int:
-        """Into how many equal substeps a communication step is divided; StepFailure for more than anybody waits for."""
+        """Into how many equal substeps a communication step is divided; StepFailure for more than can be computed."""
         count = step_ms / self.longest_substep_ms
         if count > _MOST_SUBSTEPS:
             raise StepFailure(

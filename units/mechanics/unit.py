@@ -284,7 +284,7 @@ class Mechanics(Differentiable):
         )
 
     def stretch_response(self) -> Callable[[FloatArray], FloatArray]:
-        """How the stretch answers a small change of the active stress at present, its own stiffness left out.
+        """How the stretch responds to a small change of the active stress at present, its own stiffness left out.
 
         From changes of the active stress at the nodes in MPa, shape (nodes,), to changes of the stretch, (elements,).
         """

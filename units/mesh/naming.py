@@ -1,4 +1,4 @@
-"""Which faces of a mesh file are which boundary: by the names it gives them, or by names and numbers that are told."""
+"""Which faces of a mesh file form which boundary: by the names in the file, or as the scenario assigns them."""
 
 import difflib
 from collections.abc import Mapping, Sequence

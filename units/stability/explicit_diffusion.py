@@ -1,4 +1,4 @@
-"""Diffusion by an explicit step (`electrophysiology.explicit_step`): how long a substep the shortest wave bears.
+"""Diffusion by an explicit step (`electrophysiology.explicit_step`): the shortest wave limits the stable substep.
 
 Heun's method multiplies a mode that decays at the rate λ by |1 − λh + (λh)²/2|, which is below 1 where λh < 2. The
 fastest is the largest eigenvalue of (K + G) v = λ M v, computed on the scene's mesh (`electrophysiology.fastest_mode`),

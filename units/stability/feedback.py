@@ -1,4 +1,4 @@
-"""Numbers that answer each other around a ring: the closed forms of loops with a gain, a delay, or a rate in them.
+"""Numbers that respond to each other in a ring: the closed forms of loops with a gain, a delay, or a rate in them.
 
 Of units `response`, each of which is fed by the one before it, in the order in which they step. With the ring's gain g,
 the product of all:

@@ -1,4 +1,4 @@
-"""The loop of an active stress that depends on the stretch, and a mechanics that answers it at once.
+"""The loop of an active stress that depends on the stretch, and of mechanics, which responds without delay.
 
     δs_a = K_a δλ,   δλ = −δs_a/K_p:   an error comes back as g = −K_a/K_p times itself, however short the step
 

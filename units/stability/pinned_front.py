@@ -1,4 +1,4 @@
-"""Where a front does not pass from element to element: on elements that are coarse against it, it stands still.
+"""Where a front stops between two elements, because the elements are coarse compared with its width.
 
 Without recovery the monodomain equation on a line is Nagumo's. Discretised, it has fronts that stand between two nodes
 as long as the diffusion between neighbours is too weak to lift the next node over its threshold (Keener 1987, SIAM J.

@@ -1,4 +1,4 @@
-"""The explicit step of the ionic model: how long a substep excited cells bear.
+"""The explicit step of the ionic model: the longest substep that is stable for excited cells.
 
 The ionic currents are taken explicitly by a method of second order with two stages (`electrophysiology.integration`),
 which multiplies a disturbance that decays at the rate λ by |1 − λh + (λh)²/2|: below 1 where λh < 2. The fastest decay

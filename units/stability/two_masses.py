@@ -1,4 +1,4 @@
-"""The two-mass oscillator: how far its halves may step between exchanges (Busch 2012; Schweizer, Li & Lu 2015).
+"""The two-mass oscillator: how long its steps between exchanges may be (Busch 2012; Schweizer, Li & Lu 2015).
 
 Both are integrated exactly (`test_problems.mass`), so that the matrix from one exchange to the next is exact as well,
 and the coupling is stable as long as its spectral radius is below 1. A unit that has no coupling spring of its own is

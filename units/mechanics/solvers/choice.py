@@ -18,7 +18,7 @@ MOST_FACTORISED = {"supernodal": 500_000, "superlu": 100_000}
 
 @dataclass(frozen=True)
 class LinearSolver:
-    """What solves with the stiffness."""
+    """The linear solver of the stiffness."""
 
     linear_solver: str = parameter(
         "auto",

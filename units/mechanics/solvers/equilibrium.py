@@ -1,4 +1,4 @@
-"""Static equilibrium of a solid: three methods, each slower and surer than the one before.
+"""Static equilibrium of a solid: three methods, each slower and more robust than the one before.
 
 A quasi-Newton method with factors of an earlier stiffness; Newton's method with a line search; and that again, with the
 loads raised in increments. Without these safeguards it is Newton's method alone.

@@ -1,4 +1,4 @@
-"""Newton's method with a line search: slow, and it gets there from afar."""
+"""Newton's method with a line search: slow, but it converges from far away."""
 
 import numpy as np
 
