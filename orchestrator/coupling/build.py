@@ -20,9 +20,7 @@ from .timeline import Timeline
 _RELAXATION = 0.5
 
 #: What is asked of a field that a loop's sweeps start from and that no criterion names (`convergence`).
-_UNNAMED = (
-    "no criterion given: its residual, relative to its magnitude, has to meet the strictest criterion of the loop"
-)
+_UNNAMED = "no criterion of its own: its residual, relative to its magnitude, has to meet the strictest given criterion"
 
 
 def build_scheme(
