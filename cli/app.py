@@ -10,6 +10,7 @@ from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
 from . import (
     comparison_commands,
+    movie_command,
     scenario_commands,
     schema_command,
     study_commands,
@@ -41,6 +42,7 @@ for command in (
     study_commands.tune,
     comparison_commands.sweep,
     comparison_commands.compare,
+    movie_command.movie,
     verify_command.verify,
     schema_command.schema,
 ):
