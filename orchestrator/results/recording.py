@@ -116,7 +116,7 @@ class Recording:
 
     @staticmethod
     def check(folder: Path, before: Memories) -> None:
-        """Whether all is there that `before` goes on from; DamagedFile if not. Nothing is touched."""
+        """Raise DamagedFile unless all files that `before` continues from are complete. Nothing is changed."""
         check(folder / TIME_SERIES, before["series"])
         check(folder / COUPLING, before["log"]["table"])
         stretches(before["log"])
@@ -229,8 +229,8 @@ class Recording:
         rows = self._series.rows
         reached = f". The results up to {rows[-1][0]:g} ms are complete" if rows else ""
         refused = RunError(
-            f"the results cannot be written ({_told(error)}){reached}; make room, or give back what was taken away, "
-            "and go on with --resume"
+            f"the results cannot be written ({_told(error)}){reached}; free space or restore what is missing, "
+            "and continue with --resume"
         )
         refused.kind, refused.time_ms = "results", float(rows[-1][0]) if rows else None
         return refused
