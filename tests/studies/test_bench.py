@@ -180,7 +180,10 @@ def test_the_workers_of_a_scheduler_do_it_as_well(study: Path, tmp_path: Path, c
     assert [row.errors for row in there.rows] == [row.errors for row in charted(study, output="here").rows]
 
 
-def test_a_scheduler_that_is_not_there_is_told(study: Path, tmp_path: Path, charted: Callable[..., Any]) -> None:
+def test_a_scheduler_that_is_not_there_is_told(
+    study: Path, charted: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cardiac_cosim.orchestrator.cluster._ANSWER_S", 1.0)
     with pytest.raises(InputError, match=r"--scheduler: no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         charted(study, scheduler="tcp://127.0.0.1:9")
 
