@@ -83,11 +83,14 @@ class Ended:
 
 @pytest.fixture
 def cosim(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
-    """The command, in this process and without figures. A traceback in a terminal is an exception here."""
+    """The command, in this process, without figures and report unless asked for.
+
+    A traceback in a terminal is an exception here.
+    """
 
     def call(*arguments: object) -> Ended:
-        quick = ["--no-figures"] if arguments[0] == "run" else []
-        monkeypatch.setattr(sys, "argv", ["cosim", *map(str, arguments), *quick])
+        quick = ["--no-figures", "--no-report"] if arguments[0] == "run" else []
+        monkeypatch.setattr(sys, "argv", ["cosim", str(arguments[0]), *quick, *map(str, arguments[1:])])
         capsys.readouterr()
         code = 0
         try:

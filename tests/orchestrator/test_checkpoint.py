@@ -33,7 +33,14 @@ def _run(scenario: Path, out: Path, *sets: str, resume: bool = False) -> dict[st
 
 def _command(scenario: Path, out: Path, *sets: str) -> list[str]:
     command = [sys.executable, "-m", "cardiac_cosim.cli", "run", str(scenario), "--output", str(out)]
-    return [*command, "--no-figures", "--fmu-dir", str(scenario.parent), *(p for text in sets for p in ("--set", text))]
+    return [
+        *command,
+        "--no-figures",
+        "--no-report",
+        "--fmu-dir",
+        str(scenario.parent),
+        *(p for text in sets for p in ("--set", text)),
+    ]
 
 
 def _content(out: Path) -> dict[str, Any]:

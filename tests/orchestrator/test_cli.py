@@ -55,7 +55,11 @@ def _numbers(folder: Path) -> dict[str, np.ndarray]:
 
 def _process(*arguments: object, **options: Any) -> Any:
     ended = subprocess.run(
-        [*_COMMAND, *map(str, arguments), "--no-figures"], capture_output=True, text=True, timeout=60, **options
+        [*_COMMAND, *map(str, arguments), "--no-figures", "--no-report"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        **options,
     )
     ended.stderr = without_fallbacks(ended.stderr)
     return ended

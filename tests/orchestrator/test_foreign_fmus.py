@@ -249,7 +249,10 @@ def test_a_run_that_an_fmu_ends_does_not_pass_for_done(
     (tmp_path / "oscillator.yaml").write_text(text)
     command = [sys.executable, "-m", "cardiac_cosim.cli", "run", str(tmp_path / "oscillator.yaml")]
     ended = subprocess.run(
-        [*command, "--output", str(tmp_path / "out"), "--no-figures"], capture_output=True, text=True, timeout=60
+        [*command, "--output", str(tmp_path / "out"), "--no-figures", "--no-report"],
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert ended.returncode == code
     assert ended.stderr.count("\n") == 1

@@ -124,7 +124,7 @@ def test_of_two_runs_at_once_one_runs_and_the_other_is_told_by_whom(small_scenar
     out = tmp_path / "out"
     runs = [
         subprocess.Popen(
-            [*_COMMAND, *_arguments(small_scenario, out, "--no-figures", "--set", "run.stop_ms=15")],
+            [*_COMMAND, *_arguments(small_scenario, out, "--no-figures", "--no-report", "--set", "run.stop_ms=15")],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -549,7 +549,7 @@ def test_where_no_more_can_be_written_the_run_ends_with_3_and_goes_on_when_it_ca
 ) -> None:
     out = tmp_path / "out"
     ended = subprocess.run(
-        [*_COMMAND, *_arguments(small_scenario, out, "--no-figures")],
+        [*_COMMAND, *_arguments(small_scenario, out, "--no-figures", "--no-report")],
         capture_output=True,
         text=True,
         timeout=120,

@@ -190,7 +190,7 @@ def test_when_a_worker_is_killed_the_results_so_far_are_readable_and_the_run_can
     common = ("run.checkpoint_every=3", "run.stop_ms=40", "run.participants=fmu")
     whole = _series(small_scenario, tmp_path / "whole", *common)
     out, sets = tmp_path / "killed", (*common, "run.workers=processes")
-    command = [sys.executable, "-m", "cardiac_cosim.cli", "run", str(small_scenario), "--no-figures"]
+    command = [sys.executable, "-m", "cardiac_cosim.cli", "run", str(small_scenario), "--no-figures", "--no-report"]
     command += ["--output", str(out), *(part for text in sets for part in ("--set", text))]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:

@@ -39,7 +39,7 @@ def volume(workshop: Any) -> float:
     sets = [*held, f"run.stop_ms={_STEPS}", f"output.every_ms={_STEPS}"]
     options = [word for value in sets for word in ("--set", value)]
     cosim = str(Path(sys.executable).with_name("cosim"))
-    native = ["--participants", "native", "--no-figures", "--output", "own"]
+    native = ["--participants", "native", "--no-figures", "--no-report", "--output", "own"]
     workshop.run([cosim, "run", "scenarios/baseline.yaml", *native, *options])
     workshop.run([cosim, "build", "scenarios/baseline.yaml", "--output", "heart", "--osp", "--container"])
     series = np.genfromtxt(workshop.folder / "own" / "timeseries.csv", delimiter=",", names=True)
