@@ -189,7 +189,7 @@ def test_the_workers_of_a_scheduler_do_it_as_well(
     study: Path, steps: Any, tmp_path: Path, charted: Callable[..., Any]
 ) -> None:
     address = tmp_path / "address"
-    process = _cluster_elsewhere(address)
+    process = _cluster_elsewhere(address, processes=False)
     try:
         there = charted(study, scheduler=address.read_text())
     finally:
@@ -234,12 +234,16 @@ def test_a_study_whose_workers_are_all_gone_comes_to_an_end(
     process.communicate(timeout=60)
 
 
-def _cluster_elsewhere(address: Path) -> "subprocess.Popen[bytes]":
-    """A cluster of one worker in another process, which ends when its input does; 'kill' there lets the worker die."""
+def _cluster_elsewhere(address: Path, processes: bool = True) -> "subprocess.Popen[bytes]":
+    """A cluster of one worker in another process, which ends when its input does; 'kill' there lets the worker die.
+
+    That process works itself where its worker has none of its own, from `processes`.
+    """
     text = (
         "import sys; from distributed import LocalCluster\n"
         "if __name__ == '__main__':\n"
-        "    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None)\n"
+        f"    options = {{'n_workers': 1, 'threads_per_worker': 1, 'processes': {processes}}}\n"
+        "    cluster = LocalCluster(**options, protocol='tcp://', dashboard_address=None)\n"
         f"    open({str(address)!r}, 'w').write(cluster.scheduler_address)\n"
         "    for line in sys.stdin:\n"
         "        cluster.scale(0)\n"
