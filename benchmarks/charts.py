@@ -1,7 +1,8 @@
-"""The charts of scenarios/studies in the documentation: a quarter of an hour; or `python -m benchmarks.charts NAME`.
+"""The charts of scenarios/studies in the documentation; all of them take a quarter of an hour.
 
-Runs what is missing of each study in results/<name>, copies the figure to docs/images/charts, and writes the tables of
-the pages. Run it on a machine that does nothing else.
+For each study, the points that are missing in results/<name> are run, the figure is copied to docs/images/charts, and
+the tables of the pages are written. Use a machine that does nothing else. `python -m benchmarks.charts NAME` does this
+for one study.
 """
 
 import argparse
@@ -24,7 +25,7 @@ _IMAGES = _ROOT / "docs" / "images" / "charts"
 
 
 def chart(name: str) -> Chart:
-    """Chart a study of that name, and put its figure into the documentation."""
+    """Chart the study of that name, and copy its figure into the documentation."""
     plan = plan_study(_STUDIES / f"{name}.yaml")
     folder = _ROOT / "results" / plan.study.name
     with Bench(folder, Console()) as bench:
@@ -36,7 +37,7 @@ def chart(name: str) -> Chart:
 
 
 def front(found: Chart) -> str:
-    """The table of all points that are on the front of any measure, the cheapest first."""
+    """The table of all points that are on the front of at least one measure, the cheapest first."""
     names = [measure.name for measure in found.measures]
     rows = [f"| settings | seconds | sweeps | {' | '.join(names)} |", "|---" * (3 + len(names)) + "|"]
     on = [(line.name, row) for line in found.lines for row in line.rows if row.front]
@@ -58,8 +59,11 @@ def _uncertainty(found: Chart, name: str) -> str:
 
 
 def coupling(found: Chart) -> str:
-    """The table of what a coupling costs and errs by: the steps that people use."""
-    rows = ["| coupling | sweeps | seconds | LV volume, largest error | activation | on a front |", "|---" * 6 + "|"]
+    """The table of the cost and the errors of every coupling that was run to its end."""
+    rows = [
+        "| coupling | sweeps | seconds | largest error, LV volume | largest error, activation | on a front |",
+        "|---" * 6 + "|",
+    ]
     for line in found.lines:
         for row in line.rows:
             if row.trial is None or not row.is_done:
@@ -75,7 +79,7 @@ def _setting(row: Row) -> str:
     return f"{value:g} ms" if key.endswith("_ms") else f"{key.rpartition('.')[2]} {value:g}"
 
 
-#: What is written beside the front of each study.
+#: Tables of studies other than that of the front: the page, the marker on it, and the function that makes the table.
 _TABLES: dict[str, tuple[Path, str, Callable[[Chart], str]]] = {"heartbeat": (_COUPLING, "coupling", coupling)}
 
 
@@ -86,7 +90,7 @@ def _studies(chosen: list[str]) -> Iterator[str]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m benchmarks.charts", description=__doc__)
-    parser.add_argument("studies", nargs="*", help="names of files in scenarios/studies; all if none is given")
+    parser.add_argument("studies", nargs="*", help="names of files in scenarios/studies, without .yaml; default: all")
     for each in _studies(parser.parse_args().studies):
         charted = chart(each)
         write_between(_PAGE, each, front(charted))

@@ -1,6 +1,6 @@
-"""The error budgets in docs/errors.md: `python -m benchmarks.errors strand`, or `baseline` (minutes), and settings.
+"""The error budgets in docs/errors.md: `python -m benchmarks.errors strand`, or `baseline`, which takes minutes.
 
-python -m benchmarks.errors baseline scene.mesh_size_mm=8
+Settings of the scenario may follow: `python -m benchmarks.errors baseline scene.mesh_size_mm=8`.
 """
 
 import csv
@@ -29,15 +29,15 @@ def measure(name: str, settings: list[str]) -> str:
     picture = _IMAGES / f"errors_{name}.png"
     picture.write_bytes((folder / "errors.png").read_bytes())
     shown = "\n".join(["```sh", " ".join(["cosim", *command]), "```", "", "```", *sentences, "```"])
-    return f"{shown}\n\n{_table(folder)}\n\n![The errors of {name} by source](images/{picture.name})"
+    return f"{shown}\n\n{_table(folder)}\n\n![Numerical errors of the scenario {name} by source](images/{picture.name})"
 
 
 def _table(folder: Path) -> str:
-    """A row per quantity, a column per source: the estimate and its order; in brackets what is not trusted."""
+    """A row per quantity, a column per source: the estimate and its order; in brackets if it is not trusted."""
     with (folder / "errors.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     sources = list(dict.fromkeys(row["source"] for row in rows))
-    lines = [f"| | {' | '.join(sources)} |", "|---|" + "---|" * len(sources)]
+    lines = [f"| quantity | {' | '.join(sources)} |", "|---|" + "---|" * len(sources)]
     for quantity in dict.fromkeys(row["quantity"] for row in rows):
         cells = {row["source"]: _cell(row) for row in rows if row["quantity"] == quantity}
         lines.append(f"| `{quantity}` | {' | '.join(cells[source] for source in sources)} |")

@@ -1,7 +1,7 @@
-"""The maps of scenarios/stability in the documentation: some minutes; or `python -m benchmarks.stability NAME`.
+"""The maps of scenarios/stability in the documentation; all of them take some minutes.
 
-Runs what is missing of each study in results/<name>, copies the figure to docs/images/stability, and writes the tables
-of the page.
+For each study, the runs that are missing in results/<name> are made, the figure is copied to docs/images/stability, and
+the tables of the page are written. One study: `python -m benchmarks.stability NAME`.
 """
 
 import argparse
@@ -25,7 +25,7 @@ _IMAGES = _ROOT / "docs" / "images" / "stability"
 
 
 def stability_map(name: str) -> StabilityMap:
-    """Map a study of that name, and put its figure into the documentation."""
+    """Map the study of that name, and copy its figure into the documentation."""
     plan = plan_map(STUDIES / f"{name}.yaml")
     folder = _ROOT / "results" / plan.study.name
     with Bench(folder, Console(), workers=os.cpu_count()) as bench:
@@ -37,9 +37,9 @@ def stability_map(name: str) -> StabilityMap:
 
 
 def table(found: StabilityMap) -> str:
-    """What each panel has: cells by class, and how far the boundary is from the predicted one at most."""
+    """For each panel the number of cells of each class, the measured boundary, and its distance from theory."""
     kinds = list(counted(found.cells))
-    rows = [f"| | {' | '.join(kinds)} | boundary |", "|---" * (2 + len(kinds)) + "|"]
+    rows = [f"| panel | {' | '.join(kinds)} | boundary |", "|---" * (2 + len(kinds)) + "|"]
     for panel in found.panels:
         numbers = counted(panel.cells)
         cells = [str(numbers.get(kind, 0)) for kind in kinds]
@@ -50,15 +50,16 @@ def table(found: StabilityMap) -> str:
 def _boundary(panel: Panel) -> str:
     if not panel.crossings:
         return "none"
-    y = panel.y_key.rpartition(".")[2]
-    places = [f"{Path(value_text(each.x)).name}: {each.measured:.4g}" for each in panel.crossings]
+    x, y = (key.rpartition(".")[2] for key in (panel.x_key, panel.y_key))
+    (first, at), *others = [(f"{each.measured:.4g}", Path(value_text(each.x)).name) for each in panel.crossings]
+    places = [f"{y} = {first} at {x} = {at}", *(f"{limit} at {at}" for limit, at in others)]
     known = [distance for each in panel.crossings if (distance := apart(each)) is not None]
-    told = f"{y} {', '.join(places)} at {panel.x_key.rpartition('.')[2]}"
-    return f"{told}; theory at most {100.0 * max(map(abs, known)):.1f} % away" if known else told
+    told = ", ".join(places)
+    return f"{told}; at most {100.0 * max(map(abs, known)):.1f} % from theory" if known else told
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m benchmarks.stability", description=__doc__)
-    parser.add_argument("studies", nargs="*", help="names of files in scenarios/stability; all if none is given")
+    parser.add_argument("studies", nargs="*", help="names of files in scenarios/stability, without .yaml; default: all")
     for each in parser.parse_args().studies or sorted(path.stem for path in STUDIES.glob("*.yaml")):
         write_between(_PAGE, each, table(stability_map(each)))

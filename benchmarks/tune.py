@@ -1,6 +1,6 @@
-"""What `cosim tune` finds for the strand and for the heartbeat: docs/tune.md, a minute or two.
+"""The results of `cosim tune` for the strand and for the heartbeat in docs/tune.md; they take a minute or two.
 
-Run it on a machine that does nothing else.
+Use a machine that does nothing else.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ _TOLERANCES: Mapping[str, Mapping[str, float]] = {
 
 
 def main() -> None:
-    """Tune each scenario in results/<name>.tune, as the command does, and put what it says on the page."""
+    """Tune each scenario in results/<name>.tune, as the command does, and write its messages to the page."""
     parts = []
     for name, limits in _TOLERANCES.items():
         folder = _ROOT / "results" / f"{name}.tune"

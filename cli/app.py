@@ -1,20 +1,37 @@
 """The command, put together."""
 
 import sys
+from collections.abc import Callable
+from inspect import getdoc
 
 import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
-from . import comparison_commands, scenario_commands, study_commands, verify_command
+from . import (
+    comparison_commands,
+    movie_command,
+    scenario_commands,
+    schema_command,
+    study_commands,
+    verify_command,
+    version,
+)
 from .exit_codes import INPUT_WRONG, RUN_FAILED
 
+
+def _paragraphs(command: Callable[..., None]) -> str:
+    """The help of a command without the line breaks of its source: a terminal has its own."""
+    paragraphs = getdoc(command) or ""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs.split("\n\n"))
+
+
 app = typer.Typer(
-    help="A beating two-chamber heart as FMI co-simulation of exchangeable physics units.",
-    no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.callback(
+    help="A beating two-chamber heart as FMI co-simulation of exchangeable physics units.", no_args_is_help=True
+)(version.options)
 for command in (
     scenario_commands.run,
     scenario_commands.build,
@@ -25,9 +42,11 @@ for command in (
     study_commands.tune,
     comparison_commands.sweep,
     comparison_commands.compare,
+    movie_command.movie,
     verify_command.verify,
+    schema_command.schema,
 ):
-    app.command()(command)
+    app.command(help=_paragraphs(command))(command)
 
 
 def main() -> None:

@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from .completion import STUDIES, files_ending
+from .manner import Manner, Quiet, Verbose
 from .scenario_file import Assignments, about, opened, variants
 from .study_commands import Scheduler, Workers, one_of, resumable
 
@@ -44,7 +46,10 @@ def compare(
 
 
 def sweep(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="The scenario, a YAML file.", autocompletion=files_ending(*STUDIES)),
+    ],
     varied: Annotated[
         list[str],
         typer.Argument(
@@ -53,10 +58,12 @@ def sweep(
             "combination is run.",
         ),
     ],
-    output: Annotated[Path | None, typer.Option(help="Folder of the sweep; default results/<name>.sweep.")] = None,
+    output: Annotated[Path | None, typer.Option(help="The folder of the sweep. Default: results/<name>.sweep.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     assignments: Assignments = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run a scenario with every combination of some values and show the runs together.
 
@@ -69,17 +76,18 @@ def sweep(
     from ..studies.sweep import plan_sweep, run_sweep, varied_values
 
     one_of(workers, scheduler)
+    manner = Manner(quiet, verbose)
     values = varied_values(varied)
     with opened(file, assignments or []) as (scenario, base):
         planned = plan_sweep(variants(file, assignments or [], scenario, base), values)
         folder = output or Path("results") / f"{scenario.name}.sweep"
-        console = Console(stderr=True)
+        console = manner.progress_console
         with resumable(folder), about(file), Bench(folder, console, workers, scheduler) as bench:
             swept = run_sweep(planned, bench)
             with console.status("drawing the sweep"):
                 table, page = write_sweep(swept, folder, scenario.name)
     done = sum(each.status == "done" for each in swept)
-    typer.echo(f"{scenario.name}: {done} of {len(swept)} variants ran to their end\n  table: {table}\n  page: {page}")
+    manner.say(f"{scenario.name}: {done} of {len(swept)} variants ran to their end\n  table: {table}\n  page: {page}")
 
 
 #: Characters of a folder's name.

@@ -10,16 +10,24 @@ import typer
 
 from ..orchestrator.errors import InputError
 from ..orchestrator.scenario import Scenario, load_scenario, parsed_assignments
+from .completion import SCENARIOS, files_ending
 
 if TYPE_CHECKING:
     from ..studies.plan import Variants
 
 ScenarioFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="The scenario, a YAML file, or a system package (.ssp).")
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help="The scenario: a YAML file, or a system package (.ssp).",
+        autocompletion=files_ending(*SCENARIOS),
+    ),
 ]
 Assignments = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a key of the scenario; may be repeated."),
+    typer.Option(
+        "--set", metavar="KEY.PATH=VALUE", help="Set a key of the scenario to another value; may be repeated."
+    ),
 ]
 
 #: A system package as a scenario file, beside what was unpacked; YAML reads JSON too.

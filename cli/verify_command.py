@@ -8,6 +8,7 @@ import typer
 
 from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.quoting import shortened
+from .completion import FMUS, files_ending
 from .exit_codes import INPUT_WRONG
 
 if TYPE_CHECKING:
@@ -17,12 +18,19 @@ _HEAD = ("experiment", "variable", "largest deviation", "at [s]", "allowed", "ve
 
 
 def verify(
-    files: Annotated[list[Path], typer.Argument(metavar="FMU...", help="FMUs of FMI 2.0 or 3.0, from whatever tool.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FMU...",
+            help="FMUs of FMI 2.0 or 3.0, from any tool.",
+            autocompletion=files_ending(*FMUS),
+        ),
+    ],
 ) -> None:
-    """Run the reference experiments in FMUs (FMI-LS-REF) again, and compare with the results in them.
+    """Repeat the reference experiments that FMUs contain (FMI-LS-REF), and compare with the results stored there.
 
-    Exit code 0: all within tolerance; 2: no FMU, no reference experiments in it, or damaged ones; 3: an experiment
-    deviates from its results, or the FMU failed.
+    Exit code 0: all results are within their tolerance. 2: a file is no FMU, or its reference experiments are missing
+    or damaged. 3: an experiment deviates from its stored results, or the FMU failed.
     """
     # Imported here, so that help does not wait for numerical and FMI libraries.
     from ..orchestrator.verification import verify_fmu

@@ -1,8 +1,9 @@
 """Building FMUs: a unit and a mesh in, a self-contained co-simulation FMU of FMI 2.0 or 3.0 out.
 
-The FMU carries the code of the units and loads it under a private name that holds a hash of it, so that two FMUs of
-different versions in one process never run each other's code. Its binaries are this project's own wrapper (`wrapper`),
-for every platform that it was compiled for. The archive is compressed.
+The FMU carries the code of the units, and that of a unit from outside of the project (`own_module`), and loads it under
+a private name that holds a hash of it, so that two FMUs of different versions in one process never run each other's
+code. Its binaries are this project's own wrapper (`wrapper`), for every platform that it was compiled for. The archive
+is compressed.
 """
 
 import hashlib
@@ -23,6 +24,7 @@ from .binaries import binaries
 from .description import check_size, model_description
 from .documents import PACKAGES, documents, rendered, shipped
 from .instance import MESH_FILE
+from .own_module import NAME, is_own, own_module
 from .reference_members import reference_members
 
 #: What an FMU carries of this floor; the units' floor goes whole, but for the geometries (the mesh is in the FMU).
@@ -63,7 +65,7 @@ def fingerprint(unit: type[Unit], mesh: Mesh, fmi: int = 2) -> str:
         for path in sorted(own.rglob(pattern))
     }
     builders |= {name: shipped(name).encode() for name in ("LICENSE", "CITATION.cff")}
-    for name, content in (builders | sources() | binaries(unit.name, fmi)).items():
+    for name, content in (builders | sources() | own_module(unit) | binaries(unit.name, fmi)).items():
         digest.update(f"{name} {len(content)} ".encode() + content)
     return digest.hexdigest()
 
@@ -76,12 +78,15 @@ def guid_of(key: str) -> str:
 def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path, fmi: int = 2) -> Path:
     """Write the FMU of `unit` on `mesh`, of FMI 2.0 or (`fmi` is 3) 3.0, to the file `destination` and return it.
 
-    InvalidInput where its description would be longer than what readers take; nothing is written then.
+    InvalidInput where its description would be longer than what readers take, where a variable has a unit of measure
+    that FMI has not been told, and where the module of a unit from outside of the project cannot be carried
+    (`own_module`); nothing is written then.
     """
     check_size(unit, mesh, fmi)
     token = guid_of(fingerprint(unit, mesh, fmi))
-    package, code = _package()
-    loader = rendered("load.py.in", unit=unit.name, package=package, token=token, packages=PACKAGES)
+    package, code = _package(unit)
+    own = {"module": NAME, "kind": unit.__name__} if is_own(unit) else None
+    loader = rendered("load.py.in", unit=unit.name, own=own, package=package, token=token, packages=PACKAGES)
     with tempfile.TemporaryDirectory(prefix="cosim-build-") as folder:
         packed = Path(folder) / MESH_FILE
         pack_mesh(mesh, packed)
@@ -96,10 +101,11 @@ def build_fmu(unit: type[Unit], mesh: Mesh, destination: Path, fmi: int = 2) -> 
     return destination
 
 
-def _package() -> tuple[str, dict[str, bytes]]:
+def _package(unit: type[Unit]) -> tuple[str, dict[str, bytes]]:
     """A name that holds a hash of the code, and the code with its paths below it."""
+    code = sources() | own_module(unit)
     digest = hashlib.sha256()
-    for name, content in sources().items():
+    for name, content in code.items():
         digest.update(f"{name} {len(content)} ".encode() + content)
     package = f"cosim_{digest.hexdigest()[:16]}"
-    return package, {f"{package}/{name}": content for name, content in sources().items()}
+    return package, {f"{package}/{name}": content for name, content in code.items()}

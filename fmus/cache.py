@@ -2,6 +2,8 @@
 
 import errno
 import hashlib
+import logging
+import time
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +14,8 @@ from ..units.mesh import Mesh
 from ..units.unit import Unit
 from .archive import put_in_place
 from .build import build_fmu, fingerprint, guid_of
+
+_LOG = logging.getLogger(__name__)
 
 #: Bytes of a model description in which the root element's attributes stand.
 _HEAD = 1000
@@ -31,7 +35,13 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
         raise ValueError(f"there are FMUs of FMI 2 and 3, not {fmi}")
     key = fingerprint(unit, mesh, fmi)
     path = root / key[:16] / f"{unit.name}.fmu"
-    return path if _holds(path, guid_of(key)) else build_fmu(unit, mesh, path, fmi)
+    if _holds(path, guid_of(key)):
+        _LOG.info("%s: the FMU is in the cache, %s", unit.name, path)
+        return path
+    begun = time.perf_counter()
+    built = build_fmu(unit, mesh, path, fmi)
+    _LOG.info("%s: the FMU was built in %.1f s, %s", unit.name, time.perf_counter() - begun, path)
+    return built
 
 
 def user_cache() -> Path:

@@ -1,5 +1,6 @@
 """From a scenario to a master with all it couples, ready to be initialised."""
 
+import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from .participants.recorded import recorded
 from .probes import Probes
 from .scenario import Scenario, UnitEntry
 from .scene_warnings import scene_warnings
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ def checked_mesh(scenario: Scenario, base: Path) -> Mesh | None:
         mesh = scene_mesh(scenario.scene, base)
         units = [entry.unit for entry in scenario.units.values() if entry.unit is not None]
         check_mesh(mesh, scenario.scene, base, units)
+    _LOG.info("mesh: %s nodes, %s elements", mesh.nodes, mesh.elements)
     return mesh
 
 

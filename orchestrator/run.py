@@ -11,19 +11,19 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from .alarm import Alarm
-from .assembly import assemble, called_directly, checked_mesh
+from .assembly import assemble, checked_mesh
 from .costs import Costs
 from .coupling.master import Observer
 from .errors import InputError, Interrupted, RunError
 from .participants.native import Mesh
-from .progress import ProgressBar
+from .progress import RunProgress
 from .results import implementation
 from .results.folder import ResultsFolder
 from .results.names import SUMMARY
 from .results.origin import Origin
 from .results.request import Request
 from .scenario import Scenario
-from .show import describe
+from .showing import assembled, describe
 from .stopping import StopRequest
 
 #: From a scenario, and the folder that its paths are relative to, to its mesh, if it has one.
@@ -59,13 +59,14 @@ def run_scenario(
     companion: Companion | None = None,
     request: Request | None = None,
     mesh_of: MeshOf = checked_mesh,
+    progress: bool = True,
 ) -> Outcome:
     """Run `scenario`, whose paths are relative to `base`, and write the results to `output`.
 
-    Progress goes to `console`; FMUs are taken from `fmu_dir`, or from the user's cache. With `resume` the run goes on
-    from the last checkpoint in `output`, if there is one, and ends as if it had never stopped. The `companion` presents
-    the results, also those up to a failure. `request` is kept in the summary. `mesh_of` gives the scenario's mesh:
-    whoever runs many scenarios on one mesh may have kept it.
+    Warnings go to `console`, and so does the `progress`, unless nobody wants to see it. FMUs are taken from `fmu_dir`,
+    or from the user's cache. With `resume` the run goes on from the last checkpoint in `output`, if there is one, and
+    ends as if it had never stopped. The `companion` presents the results, also those up to a failure. `request` is kept
+    in the summary. `mesh_of` gives the scenario's mesh: whoever runs many scenarios on one mesh may have kept it.
 
     Raises
     ------
@@ -89,12 +90,12 @@ def run_scenario(
         summary = folder.complete() if resume else None
         if summary is None:
             try:
-                outcome = _run(folder, scenario, base, console, fmu_dir, resume, started, companion, mesh_of)
+                outcome = _run(folder, scenario, base, console, fmu_dir, resume, started, companion, mesh_of, progress)
             except RunError as error:
                 # What led to the failure is what one wants to look at.
                 if companion is not None and (output / SUMMARY).exists():
                     companion.begin()
-                    _warn(console, _finished(companion, console, error))
+                    _warn(console, _finished(companion, console, progress, error))
                 raise
         else:
             outcome = Outcome(output, summary)
@@ -102,13 +103,15 @@ def run_scenario(
                 companion.begin()
         if companion is None:
             return outcome
-        return replace(outcome, warnings=(*outcome.warnings, *_finished(companion, console)))
+        return replace(outcome, warnings=(*outcome.warnings, *_finished(companion, console, progress)))
 
 
-def _finished(companion: Companion, console: Console, failure: RunError | None = None) -> tuple[str, ...]:
+def _finished(
+    companion: Companion, console: Console, progress: bool, failure: RunError | None = None
+) -> tuple[str, ...]:
     """The warnings of what was begun; a bug in it does not hide the `failure` of the run."""
     try:
-        with console.status("drawing the results"):
+        with (console if progress else Console(quiet=True)).status("drawing the results"):
             return companion.finish()
     except Exception as error:
         if failure is None:
@@ -126,6 +129,7 @@ def _run(
     started: float,
     companion: Companion | None,
     mesh_of: MeshOf,
+    progress: bool,
 ) -> Outcome:
     before = folder.checkpoint() if resume else None
     mesh = mesh_of(scenario, base)
@@ -156,7 +160,7 @@ def _run(
         _warn(console, implementation.fallbacks(implementations.values()))
         # Nothing in the folder was touched up to here.
         recording = folder.record(assembly, before, costs, implementations)
-        bar = ProgressBar(console, scenario.name, scenario.run.stop_ms)
+        bar = RunProgress(console if progress else Console(quiet=True), scenario.name, scenario.run.stop_ms)
         with recording, bar:
             if unready is not None:
                 raise unready
@@ -187,7 +191,5 @@ def _about(path: Path) -> Iterator[None]:
 
 def show_scenario(scenario: Scenario, base: Path, fmu_dir: Path | None = None) -> str:
     """What `scenario` builds, exchanges and solves, in words; nothing is computed but the mesh."""
-    mesh = checked_mesh(scenario, base)
-    with ExitStack() as stack:
-        assembly = assemble(stack, called_directly(scenario), base, mesh, fmu_dir, described=True)
+    with assembled(scenario, base, fmu_dir) as assembly:
         return describe(assembly)

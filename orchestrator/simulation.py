@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .results.default_folder import default_folder
 from .results.request import Request
 from .results.stored_run import StoredRun
 from .run import run_scenario
@@ -23,7 +24,8 @@ def simulate(
     settings:
         Values by key, `{"coupling.step_ms": 5}`, as `--set` has them.
     output:
-        The results folder; `results/<name>` if not given.
+        The results folder. If not given, `results/<name>`, or, where that has results of other settings, a folder
+        beside it whose name says how they differ.
     resume:
         Go on from the last checkpoint in that folder, if there is one; a run that is complete is not run again.
 
@@ -36,6 +38,6 @@ def simulate(
     """
     path = Path(file)
     scenario = validated(with_settings(scenario_content(path), settings or {}), Scenario, str(path))
-    folder = Path("results") / scenario.name if output is None else Path(output)
+    folder = default_folder(scenario, resume) if output is None else Path(output)
     request = Request(str(path), settings or {})
     return StoredRun(run_scenario(scenario, path.parent, folder, resume=resume, request=request).folder)

@@ -1,5 +1,6 @@
 """Where the points of a study are run, each once, and their results are kept: `points/<hash>` in the study's folder."""
 
+import logging
 import os
 import shutil
 import time
@@ -13,16 +14,18 @@ from types import TracebackType
 from distributed import Future, wait
 from distributed.scheduler import KilledWorker
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..orchestrator.cluster import Cluster
 from ..orchestrator.errors import InputError, Interrupted, RunError
+from ..orchestrator.progress import Progress
 from ..orchestrator.results.lock import FolderLock
 from ..orchestrator.results.origin import program
 from ..orchestrator.stopping import StopRequest
 from .execution import Job, execute, time_once
 from .point import Point
 from .trial import CRASHED, Trial, read_trial
+
+_LOG = logging.getLogger(__name__)
 
 _POINTS = "points"
 
@@ -109,15 +112,15 @@ class Bench:
         trials = {point.key: trial for point, trial in zip(points, self.run(points, title), strict=True)}
         unique = {point.key: point for point in points}
         missing = {key: max(runs - len(trials[key].costs), 0) for key in unique if trials[key].is_done}
-        bar = self._bar(title)
-        task = bar.add_task(title, total=sum(missing.values()), now="")
-        with bar:
+        total, done = sum(missing.values()), 0
+        with Progress(self._console, title, total) as bar:
             while any(missing.values()):
                 for key in [key for key, count in missing.items() if count]:
-                    bar.update(task, now=str(unique[key]))
+                    bar.update(done, f"{done}/{total}", str(unique[key]))
                     self._time(unique[key], trials)
                     missing[key] -= 1
-                    bar.advance(task)
+                    done += 1
+            bar.update(done, f"{done}/{total}")
         return [trials[point.key] for point in points]
 
     # --- inside -------------------------------------------------------------------------------------------------------
@@ -130,14 +133,15 @@ class Bench:
 
     def _run(self, points: Sequence[Point], count: int, title: str, trials: dict[str, Trial]) -> None:
         queue, running = deque(points), dict[Future, Point]()
-        bar = self._bar(title)
-        task = bar.add_task(title, total=count, completed=count - len(points), now="")
-        with bar:
+        done, now = count - len(points), ""
+        with Progress(self._console, title, count) as bar:
+            bar.update(done, f"{done}/{count}")
             cluster = self._started()
             while queue or running:
                 while queue and len(running) < len(cluster.workers):
                     point = queue.popleft()
-                    bar.update(task, now=str(point))
+                    now = str(point)
+                    bar.update(done, f"{done}/{count}", now)
                     running[cluster.client.submit(execute, self._job(point), pure=False)] = point
                 finished = _finished(running)
                 self._check_alive(cluster, bool(finished))
@@ -145,20 +149,13 @@ class Bench:
                     point = running.pop(future)
                     trials[point.key] = trial = self._outcome(future, point)
                     self._account(trial)
-                    bar.advance(task)
+                    done += 1
+                    bar.update(done, f"{done}/{count}", now)
+                    _LOG.info(
+                        "%s: %s of %s, %s: %s", title, done, count, point, trial.reason or f"{trial.wall_s:.2f} s"
+                    )
                 if self._stop.signal is not None:
                     raise Interrupted(self._stop.signal)
-
-    def _bar(self, title: str) -> Progress:
-        return Progress(
-            TextColumn(f"[bold]{title}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[now]}"),
-            TimeElapsedColumn(),
-            console=self._console,
-            disable=not self._console.is_terminal,
-        )
 
     def _time(self, point: Point, trials: dict[str, Trial]) -> None:
         future = self._started().client.submit(time_once, self._job(point), pure=False)

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from ..orchestrator.scenario.model import NAME, FilePath, Positive
+from ..orchestrator.scenario.section import Section
+from ..orchestrator.scenario.values import FilePath, Name, Positive
 
 #: Values at keys of a scenario (`coupling.step_ms`).
 Settings = dict[str, Any]
@@ -20,16 +21,23 @@ _MOST_HALVINGS = 20
 _MOST_STEPS = 10_000_000
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+class Line(Section):
+    """Points that belong together: every combination of the values in `vary`, with `set` the same for all of them."""
 
-
-class Line(_Section):
-    """Points that belong together: every combination of the values in `vary`, with `set` the same for all."""
-
-    name: Annotated[str, Field(min_length=1)]
-    set: Settings = Field(default_factory=dict)
-    vary: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
+    name: Annotated[str, Field(min_length=1)] = Field(
+        description="The name of the line, as the legend has it. No two lines may have the same name."
+    )
+    set: Settings = Field(
+        default_factory=dict,
+        description="Values of keys of the scenario for all points of this line, in addition to those of the study: "
+        "`coupling.scheme: jacobi`.",
+    )
+    vary: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
+        default_factory=dict,
+        description="Keys of the scenario with the list of values that each takes: `coupling.step_ms: [1, 2, 5]`. With "
+        "several keys every combination of their values is a point. A stability map needs exactly two keys: that of "
+        "the x axis first, then that of the y axis.",
+    )
 
     @model_validator(mode="after")
     def _either(self) -> "Line":
@@ -54,29 +62,58 @@ def _references(value: Any) -> list[Settings]:
     return references
 
 
-class Study(_Section):
-    """A whole study.
+class Study(Section):
+    """A study: many runs of one scenario with different settings, compared in a chart, or in a map of stability.
 
-    `set` is for every point and for the references; `reference` are one or two (`references`); without `measures` all
-    that the scenario has are taken.
-
-    For stability maps: the two keys that a line varies are the axes, x first. `steps` gives every run so many
-    communication steps, whatever their size. Between sound cells and others the distance along y is halved `bisect`
-    times. `theory` names what predicts the boundary; `growth` says how the growth of disturbances is measured; a run
-    that errs by more than the `tolerances`, by measure, is inaccurate.
+    A chart (`cosim chart`) needs a `reference`. A stability map (`cosim stability`) needs lines of two keys each.
     """
 
-    name: Annotated[str, Field(pattern=NAME)]
-    scenario: FilePath
-    set: Settings = Field(default_factory=dict)
-    reference: Annotated[Any, AfterValidator(_references)] = None
-    measures: Annotated[list[str] | None, Field(min_length=1)] = None
-    lines: Annotated[list[Line], Field(min_length=1)]
-    steps: Annotated[int | None, Field(ge=1, le=_MOST_STEPS)] = None
-    bisect: Annotated[int, Field(ge=0, le=_MOST_HALVINGS)] = 0
-    theory: str | None = None
-    growth: Literal["alternating", "modes"] = "alternating"
-    tolerances: dict[str, Positive] = Field(default_factory=dict)
+    name: Name = Field(
+        description="The name of the study. Its results go to `results/<name>` unless told otherwise. It begins with a "
+        "letter or a digit; letters, digits, `_`, `-` and `.` may follow."
+    )
+    scenario: FilePath = Field(description="The path of the scenario file, relative to the study file.")
+    set: Settings = Field(
+        default_factory=dict,
+        description="Values of keys of the scenario for all runs of the study, the references included: "
+        "`run.participants: native`.",
+    )
+    reference: Annotated[Any, AfterValidator(_references)] = Field(
+        default=None,
+        description="What the errors of all points are taken from: the settings of a finer run, or the folder of one "
+        "that is there, or a list of two of these, whose difference is the uncertainty of the reference.",
+    )
+    measures: Annotated[list[str] | None, Field(min_length=1)] = Field(
+        default=None,
+        description="The quantities whose errors are compared, such as `lv_volume_ml` or `activation_ms`. By default "
+        "all that the scenario has.",
+    )
+    lines: Annotated[list[Line], Field(min_length=1)] = Field(
+        description="The lines of the chart, or the panels of the map, each with its points."
+    )
+    steps: Annotated[int | None, Field(ge=1, le=_MOST_STEPS)] = Field(
+        default=None,
+        description="The number of communication steps of every run, whatever their size; `run.stop_ms` and "
+        "`output.every_ms` follow from it and must not be given. By default every run lasts as long as the scenario.",
+    )
+    bisect: Annotated[int, Field(ge=0, le=_MOST_HALVINGS)] = Field(
+        default=0,
+        description="For stability maps: how many times the distance along y between a sound point and one that fails "
+        "is halved by further runs, to find the boundary between them.",
+    )
+    theory: str | None = Field(
+        default=None, description="For stability maps: the name of the theory that predicts the boundary of stability."
+    )
+    growth: Literal["alternating", "modes"] = Field(
+        default="alternating",
+        description="For stability maps: how the growth of disturbances is measured, by the alternation of exchanged "
+        "fields (`alternating`), or by the modes of a linear system that are fitted to what is exchanged (`modes`).",
+    )
+    tolerances: dict[str, Positive] = Field(
+        default_factory=dict,
+        description="For stability maps: the largest error of a measure, in its unit of measure, with which a run "
+        "counts as accurate; a `reference` is needed then.",
+    )
 
     @model_validator(mode="after")
     def _named_once(self) -> "Study":

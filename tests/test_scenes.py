@@ -57,7 +57,7 @@ def test_small_scenes_run_through_fmus_with_the_same_bits(name: str, tmp_path: P
     assert series[0] == series[1]
 
 
-# --- the numbers of model.md, computed independently --------------------------------------------------------------
+# --- the numbers of docs/model.md, computed independently -------------------------------------------------------------
 
 
 def test_the_cells_action_potential(tmp_path: Path) -> None:
@@ -97,10 +97,10 @@ def test_the_sheets_wave_is_faster_along_the_fibres(tmp_path: Path) -> None:
     # At equal distances, which is what its plot shows: the speed of a plane wave is 0.5717 mm/ms along the fibres and
     # by the square root of 1.1 less across; a front that is curved outward is slower than a plane one.
     times = summary["activation_time_ms"]
-    speeds = {way: 10.0 / (times[f"{way}_far"] - times[f"{way}_near"]) for way in ("along", "across")}
+    speeds = {way: 8.0 / (times[f"{way}_far"] - times[f"{way}_near"]) for way in ("along", "across")}
     assert times["along_near"] < times["across_near"] - 0.5
     assert times["along_far"] < times["across_far"] - 1.0
-    assert speeds["along"] / speeds["across"] == pytest.approx(np.sqrt(1.1), rel=0.015)
+    assert speeds["along"] / speeds["across"] == pytest.approx(np.sqrt(1.1), rel=0.01)
     for way, plane in (("along", 0.5717), ("across", 0.5717 / np.sqrt(1.1))):
         assert 0.9 * plane < speeds[way] < plane, way
     with h5py.File(tmp_path / "sheet" / "fields.h5") as file:
@@ -189,7 +189,7 @@ def test_a_loops_gain_decides_and_not_the_step_until_it_is_iterated(step_ms: flo
 def test_identical_cells_in_a_row_are_one_cell(name: str, tmp_path: Path) -> None:
     everywhere = ("stimulus_x_min_mm=-1", "stimulus_x_max_mm=100", "stimulus_half_width_mm=100")
     sets = [f"units.electrophysiology.parameters.{setting}" for setting in everywhere]
-    common = ("run.stop_ms=50", "coupling.step_ms=5")
+    common = ("run.stop_ms=50", "coupling.step_ms=5", "output.every_ms=5")
     cell, _ = _run("cell", tmp_path, *common)
     many, _ = _run(name, tmp_path, *common, "scene.mesh_size_mm=6", *sets)
     columns = [column for column in many.dtype.names or () if column.startswith("potential_")]

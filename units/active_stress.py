@@ -3,9 +3,10 @@
     ∂s_a/∂t = ε(Φ)(k(Φ − Φ_r) − s_a),   ε = ε₀ + (ε₁ − ε₀) exp(−exp(−ζ(Φ − Φ_t)))
 
 The input is the transmembrane potential, held over a step or varying linearly, and optionally the stretch. The output
-is s_a in kPa. Source: model.md, Active stress; Göktepe & Kuhl 2010, eq. 46. For a held potential, the step is exact and
-may have any length. With `time_integration: forward_euler` a step of length H gives s_a + H ε (k(Φ − Φ_r) − s_a) with
-the potential at its end. This oscillates with growing amplitude where ε₁ H > 2; the option exists to show that limit.
+is s_a in kPa. Source: docs/model.md, Active stress; Göktepe & Kuhl 2010, eq. 46. For a held potential, the step is
+exact and may have any length. With `time_integration: forward_euler` a step of length H gives
+s_a + H ε (k(Φ − Φ_r) − s_a) with the potential at its end. This oscillates with growing amplitude where
+ε₁ H > 2; the option exists to show that limit.
 
 If the potential varies linearly over a step, each node is treated as if its potential jumped from the value at the
 beginning to the value at the end, at a moment that is evenly distributed over the step. The mean potential is then the

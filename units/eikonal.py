@@ -2,8 +2,8 @@
 
 The outputs are those of the monodomain unit with Aliev–Panfilov cells. The unit is for scenes in which only the arrival
 of the wave matters: a step solves no equations and may have any length. The speed of a plane wave is √(c d/(2β_t)) (1 −
-2α), the closed form of the front for r = 0 (Nagumo; model.md, Numbers). Before the activation potential is crossed, the
-potential is that of the foot of the same front; afterwards, it is the action potential of a single cell.
+2α), the closed form of the front for r = 0 (Nagumo; docs/model.md, Numbers). Before the activation potential is
+crossed, the potential is that of the foot of the same front; afterwards, it is the action potential of a single cell.
 
 How it fails: the unit neglects the curvature of the front and electrotonic currents, so that small stimuli start a wave
 too early. The stretch has no influence, and so there is no such input. On coarse meshes, the speed is closer to that of

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...fmus.cache import cached_fmu
 from ...units.errors import InvalidInput, StepFailure
+from ...units.geometry.registry import GEOMETRIES
 from ...units.geometry.registry import build as build_geometry
 from ...units.mesh import Mesh
 from ...units.mesh.archive import pack_mesh
@@ -30,6 +31,7 @@ from ..scenario import Scene
 from .accuracy import AccuracyParameter
 from .participant import Abilities, Implementation, Parameters, Port, Ports, Ramp, Values, Wait
 from .ramping import Ramps, whole
+from .unit_parameter import UnitParameter
 
 __all__ = [
     "Coupled",
@@ -44,14 +46,19 @@ __all__ = [
     "check_unit",
     "element_quality",
     "fmu_of_unit",
+    "geometry_names",
     "is_memoryless",
     "located",
     "mesh_warnings",
     "packed_mesh",
     "scene_mesh",
     "stability_theory",
+    "theory_names",
+    "unit_names",
+    "unit_parameters",
     "unit_ports",
     "unit_setting",
+    "unit_summary",
     "unit_warnings",
 ]
 
@@ -126,6 +133,43 @@ def accuracy_parameters(unit: str) -> Mapping[str, AccuracyParameter]:
         for name, variable in _declared_parameters(unit).items()
         if variable.refines is not None and isinstance(variable.start, int | float)
     }
+
+
+def geometry_names() -> list[str]:
+    """The anatomies that `scene.geometry` may name."""
+    return sorted(GEOMETRIES)
+
+
+def unit_names() -> list[str]:
+    """The units that a scenario may name."""
+    return list(UNITS)
+
+
+def theory_names() -> list[str]:
+    """The theories of stability that a study may name."""
+    return sorted(THEORIES)
+
+
+def unit_summary(unit: str) -> str:
+    """What a unit is, in one sentence; InputError if there is no such unit."""
+    return (_kind(unit).__doc__ or "").partition("\n")[0]
+
+
+def unit_parameters(unit: str) -> list[UnitParameter]:
+    """The parameters of a unit in the order of their declaration; InputError if there is no such unit."""
+    return [
+        UnitParameter(
+            name,
+            variable.start,
+            variable.unit,
+            variable.description,
+            variable.above,
+            variable.at_least,
+            variable.below,
+            variable.choices,
+        )
+        for name, variable in _declared_parameters(unit).items()
+    ]
 
 
 def _lower_limit(variable: Variable) -> tuple[float, bool]:

@@ -100,6 +100,16 @@ def read_checkpoint(folder: Path, origin: Origin) -> Memories | None:
     return memories
 
 
+def checkpoint_scenario(folder: Path) -> Any:
+    """The resolved scenario that the checkpoint in `folder` is of; None if there is none that can be read."""
+    try:
+        with reading_sealed(folder / CHECKPOINT) as file:
+            return json.loads(file["origin"][()])["scenario"]
+    # What h5py raises of a file that lacks something, and what an operating system does not read.
+    except (OSError, KeyError, ValueError, TypeError, AttributeError):
+        return None
+
+
 def _indexed(memory: Mapping[str, Any], values: bytearray, known: dict[int, int]) -> dict[str, Any]:
     """`memory` with type, shape and place in place of its arrays, whose bytes are added to `values`.
 

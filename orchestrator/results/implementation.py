@@ -4,6 +4,7 @@ Kernels, instruction sets and linear solvers round differently. A run that goes 
 would be neither of the two runs; like one with other packages it is refused.
 """
 
+import logging
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, ParticipantError, RunError
 from ..participants.participant import Implementation, Participant
+
+_LOG = logging.getLogger(__name__)
 
 
 def implementations(participants: Mapping[str, Participant]) -> dict[str, Implementation]:
@@ -21,6 +24,8 @@ def implementations(participants: Mapping[str, Participant]) -> dict[str, Implem
             found[name] = participant.implementation()
         except ParticipantError as error:
             raise RunError(f"unit '{name}' does not say what it computes with: {error}") from error
+        if found[name].text:
+            _LOG.info("%s computes with %s", name, found[name].text)
     return found
 
 

@@ -84,6 +84,19 @@ class FolderLock:
             return False
 
 
+def is_in_use(folder: Path) -> bool:
+    """Whether a run holds the folder at this moment."""
+    try:
+        descriptor = os.open(folder / _NAME, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        # Closing gives it back.
+        return not lock_descriptor(descriptor, blocking=False)
+    finally:
+        os.close(descriptor)
+
+
 def _locked(descriptor: int) -> bool:
     """Lock a file for this process, if that is possible within a moment."""
     until = time.monotonic() + _PATIENCE_S

@@ -48,8 +48,7 @@ class Origin:
     @classmethod
     def of(cls, scenario: Scenario, base: Path) -> "Origin":
         """The origin of a run of `scenario`, whose paths are relative to `base`, here and now."""
-        # As it comes back from a file.
-        resolved = json.loads(json.dumps(scenario.resolved()))
+        resolved = resolved_as_stored(scenario)
         files = {name: _hash(base / name) for name in scenario.files()}
         versions = {"python": python_version(), **_versions()}
         return cls(resolved, files, program(), versions)
@@ -75,7 +74,7 @@ class Origin:
 
     def changed_keys(self, earlier: "Origin") -> list[str]:
         """The keys of the scenario that were others."""
-        return _differences(earlier.scenario, self.scenario)
+        return differences(earlier.scenario, self.scenario)
 
     def changes(self, earlier: "Origin") -> list[str]:
         """What of the rest was another, in words, each with what undoes it."""
@@ -91,6 +90,12 @@ class Origin:
         if earlier.program != self.program and not found:
             found.append("this program has changed since; take the version that began the run")
         return found
+
+
+def resolved_as_stored(scenario: Scenario) -> dict[str, Any]:
+    """The resolved scenario as it comes back from a file."""
+    content: dict[str, Any] = json.loads(json.dumps(scenario.resolved()))
+    return content
 
 
 def _versions() -> dict[str, str]:
@@ -111,13 +116,13 @@ def _counted(name: str, version: str) -> str:
     return ".".join(version.split(".")[:2]) if name == "python" else version
 
 
-def _differences(one: Any, other: Any, key: str = "") -> list[str]:
-    """The keys at which two scenarios differ."""
+def differences(one: Any, other: Any, key: str = "") -> list[str]:
+    """The keys at which two resolved scenarios differ, written with dots."""
     if isinstance(one, dict) and isinstance(other, dict):
         return [
             difference
             for name in sorted(one.keys() | other.keys())
-            for difference in _differences(one.get(name), other.get(name), f"{key}.{name}" if key else name)
+            for difference in differences(one.get(name), other.get(name), f"{key}.{name}" if key else name)
         ]
     return [] if one == other else [key]
 

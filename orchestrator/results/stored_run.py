@@ -98,13 +98,18 @@ class StoredRun:
         return _frame(self.folder / COUPLING)
 
     @cached_property
+    def cells(self) -> NDArray[np.int64] | None:
+        """The nodes of the elements of any scene, shape (elements, dimension + 1)."""
+        cells = self._read("cells")
+        return None if cells is None else cells.astype(np.int64)
+
+    @cached_property
     def mesh(self) -> Body | None:
         """See the class."""
-        points, cells = self._read("points_mm"), self._read("cells")
-        # The figures in space are of solids.
+        points, cells = self.points_mm, self.cells
         if points is None or cells is None or cells.shape[1] != 4:
             return None
-        return Body(points, cells.astype(np.int64))
+        return Body(points, cells)
 
     @cached_property
     def frames_ms(self) -> Values:

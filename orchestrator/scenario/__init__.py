@@ -1,5 +1,7 @@
 """A scenario: what a person asks for in a YAML file, validated whole before anything runs."""
 
+from .connection_section import ConnectionEntry
+from .coupling_section import Coupling, Iterate
 from .file import (
     Contradiction,
     checked,
@@ -10,8 +12,10 @@ from .file import (
     validated,
     with_settings,
 )
-from .model import ConnectionEntry, Coupling, Iterate, Scenario, Scene, UnitEntry, is_whole
+from .model import Scenario, is_whole
 from .rewritten import rewritten
+from .scene_section import Scene
+from .unit_section import UnitEntry
 
 __all__ = [
     "ConnectionEntry",

@@ -7,7 +7,8 @@ from pydantic import BaseModel
 
 from ..errors import did_you_mean
 from ..quoting import quoted, shortened
-from .model import AS_ENTRY, AS_TEXT, NAME, PROBE_NAME, UNIT_NAME, WORKERS
+from .connection_section import AS_ENTRY, AS_TEXT
+from .values import NAME, PROBE_NAME, UNIT_NAME, WORKERS
 
 _ALLOWED = {
     WORKERS: "choose threads, processes, or the address of a Dask scheduler, tcp://host:port",

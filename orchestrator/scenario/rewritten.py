@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -18,6 +19,9 @@ from .model import Scenario
 #: Columns that a line may have: those of the file are not to be broken.
 _WIDTH = 100_000
 
+#: The comment that tells editors which schema the file has.
+_SCHEMA = re.compile(r"(?P<before>^# yaml-language-server: \$schema=)(?P<path>\S+)", re.MULTILINE)
+
 
 def rewritten(file: Path, settings: Mapping[str, Any], folder: Path) -> str:
     """The text of the scenario in `file` with `settings` at their keys, and with paths that are relative to `folder`.
@@ -29,7 +33,8 @@ def rewritten(file: Path, settings: Mapping[str, Any], folder: Path) -> str:
     wanted = validated(with_settings(own, settings), Scenario, str(file))
     changes = _needed(own, settings, wanted) | _paths(wanted, file.parent, folder)
     content = with_settings(own, changes)
-    text = _with(file.read_text(encoding="utf-8"), dict.fromkeys(replaced(changes)) | changes)
+    own_text = _from_folder(file.read_text(encoding="utf-8"), file.parent, folder)
+    text = _with(own_text, dict.fromkeys(replaced(changes)) | changes)
     if _same(text, content, file):
         return text
     return _dumped(YAML(), content)
@@ -56,6 +61,17 @@ def _paths(scenario: Scenario, base: Path, folder: Path) -> dict[str, str]:
         for key, path in named.items()
         if path is not None and not Path(path).is_absolute()
     }
+
+
+def _from_folder(text: str, base: Path, folder: Path) -> str:
+    """The text with the path of its schema, which a comment has for editors, as it is called from `folder`."""
+
+    def moved(match: re.Match[str]) -> str:
+        path = match["path"]
+        is_elsewhere = "://" in path or Path(path).is_absolute()
+        return match[0] if is_elsewhere else f"{match['before']}{os.path.relpath(base / path, folder)}"
+
+    return _SCHEMA.sub(moved, text)
 
 
 def _with(text: str, settings: Mapping[str, Any]) -> str:

@@ -1,5 +1,6 @@
 """comparison.html: runs beside one another in one file, which works without a network."""
 
+from base64 import b64encode
 from math import isfinite, isnan
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from ...studies.point import value_text
 from .compared import Compared
 from .curves import compared_columns, curves
 from .differences import Row, headline_rows, measure_rows
+from .side_by_side import side_by_side
 
 COMPARISON_HTML = "comparison.html"
 
@@ -36,6 +38,13 @@ def body(compared: Compared) -> str:
     measured = measure_rows(compared)
     if measured:
         parts.append(f"<h2>Largest differences over the whole run</h2>\n{_measures(measured)}")
+    picture = side_by_side(compared)
+    if picture is not None:
+        image = b64encode(picture).decode()
+        parts.append(
+            '<h2>Side by side</h2>\n<figure><img alt="The transmembrane potential of the runs at the same times" '
+            f'src="data:image/png;base64,{image}"></figure>'
+        )
     figure = curves(compared)
     if figure is not None:
         parts.append(

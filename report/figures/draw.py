@@ -2,7 +2,7 @@
 
 import io
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -11,21 +11,35 @@ from matplotlib.figure import Figure
 from ...orchestrator.results.stored_run import StoredRun
 from ...orchestrator.results.whole import write_whole
 from ..heading import heading_of
+from .activation_map import activation_map
+from .boundaries import boundaries
 from .cavity_volumes import cavity_volumes
 from .cell_response import cell_response
+from .displacement_snapshots import displacement_snapshots
 from .fiber_layout import fiber_layout
-from .heart_potential import heart_potential
+from .geometry import geometry
 from .other_outputs import other_outputs
+from .potential_snapshots import potential_snapshots
 from .pressure_volume import pressure_volume
 from .probe_potential import probe_potential
 from .residuals import residuals
 from .space_time import space_time
+from .stimulus import stimulus
+from .transmural_directions import transmural_directions
 from .wall_motion import wall_motion
 
 #: Each figure by its file name; one that finds no data in the run returns None.
 FIGURES: dict[str, Callable[[StoredRun], Figure | None]] = {
+    # In space.
+    "geometry": geometry,
+    "boundaries": boundaries,
+    "transmural_directions": transmural_directions,
     "fiber_layout": fiber_layout,
-    "potential_on_deformed_heart": heart_potential,
+    "stimulus": stimulus,
+    "potential_snapshots": potential_snapshots,
+    "displacement_snapshots": displacement_snapshots,
+    "activation_map": activation_map,
+    # Curves.
     "potential_at_probes": probe_potential,
     "cavity_volumes": cavity_volumes,
     "pressure_volume": pressure_volume,
@@ -36,14 +50,23 @@ FIGURES: dict[str, Callable[[StoredRun], Figure | None]] = {
     "residuals": residuals,
 }
 
-_DOTS_PER_INCH = 160
+#: Those that show only what is known when a run begins.
+_STILL = ("geometry", "boundaries", "transmural_directions", "fiber_layout", "stimulus")
 
-#: Of a heading, at least.
-_LETTERS_PER_INCH = 12
+#: Those whose frames can be asked for.
+_IN_FRAMES: dict[str, Callable[[StoredRun, Sequence[float]], Figure | None]] = {
+    "potential_snapshots": potential_snapshots,
+    "displacement_snapshots": displacement_snapshots,
+}
 
+#: Pixels across a picture.
+_ACROSS = 1280
 
-#: Those that show only what does not change over a run.
-_STILL = ("fiber_layout",)
+#: Letters of a heading that an inch holds, at least.
+_LETTERS_PER_INCH = 10
+
+#: Height of a line of it.
+_LINE_IN = 0.19
 
 
 def draw_still(folder: Path, heading: str) -> dict[str, bytes]:
@@ -56,13 +79,19 @@ def draw_still(folder: Path, heading: str) -> dict[str, bytes]:
     return {name: _picture(figure, heading) for name, figure in figures.items() if figure is not None}
 
 
-def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list[Path]:
+def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None, times_ms: Sequence[float] = ()) -> list[Path]:
     """Draw every figure that the results in `folder` have the data for; returns the files in `folder`/figures.
 
-    `still` are pictures that were drawn when the run began.
+    `still` are pictures that were drawn when the run began. `times_ms` are the times whose nearest frames are shown in
+    place of those that are chosen by what happens.
 
     A figure without data is skipped, and its file from an earlier run in the same folder is removed: what lies in
     `figures` always belongs to the results next to it.
+
+    Raises
+    ------
+    InputError
+        For a time outside the run.
     """
     run = StoredRun(folder)
     drawn = []
@@ -70,7 +99,7 @@ def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list
         path = folder / "figures" / f"{name}.png"
         picture = None if still is None else still.get(name)
         if picture is None:
-            figure = draw(run)
+            figure = _IN_FRAMES[name](run, times_ms) if name in _IN_FRAMES else draw(run)
             picture = None if figure is None else _picture(figure, heading_of(run))
         if picture is None:
             path.unlink(missing_ok=True)
@@ -82,9 +111,14 @@ def draw_figures(folder: Path, still: Mapping[str, bytes] | None = None) -> list
 
 
 def _picture(figure: Figure, heading: str) -> bytes:
+    """The figure as a PNG file, with the heading above it in as many lines as it takes."""
     FigureCanvasAgg(figure)
-    lines = textwrap.fill(heading, int(_LETTERS_PER_INCH * figure.get_figwidth()))
-    figure.suptitle(lines, fontsize=11, x=0.01, ha="left")
+    width, height = figure.get_size_inches()
+    lines = textwrap.wrap(heading, int(_LETTERS_PER_INCH * width))
+    # Figures have room for a heading of one line.
+    figure.set_figheight(height + _LINE_IN * (len(lines) - 1))
+    figure.suptitle("\n".join(lines), fontsize=11, fontweight="bold", x=0.01, ha="left")
+    figure.align_ylabels()
     content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=_DOTS_PER_INCH)
+    figure.savefig(content, format="png", dpi=_ACROSS / width)
     return content.getvalue()

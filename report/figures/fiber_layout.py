@@ -1,63 +1,82 @@
-"""Fibres in the undeformed configuration, coloured by their helix angle."""
-
-import math
+"""Fibres in the undeformed configuration: at three depths of the wall, and how their helix angle changes through it."""
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
-from scipy.spatial import cKDTree
 
 from ...orchestrator.participants.participant import Values
 from ...orchestrator.results.stored_run import Body, StoredRun
-from .scene import Painted, View, add_scale_bar, pen, shaded, show, strokes
-from .surface import Numbers, normals, section, sharp_edges, smoothing, surface
+from .layout import BAR_IN, TITLE_PT, color_bar, panels
+from .scene import Painted, View, add_scale_bar, shaded, show, strokes
+from .skin import Skin
+from .surface import Numbers
+from .thinning import thinned
+from .viewpoints import facing, short_axis, through_wall
+from .wall_layers import Layer, layers_of_the_wall, surfaces
 
 # Least distance, length and width of the fibre lines relative to the size of the body.
-_SPACING, _LENGTH, _WIDTH = 1 / 36, 1 / 20, 1 / 250
+_SPACING, _LENGTH, _WIDTH = 1 / 24, 1 / 15, 1 / 120
 
 # Lines on faces that are seen from the side, by the cosine of the angle, would stick out of the outline like hair.
 _FRONT = 0.15
 
-# Title, azimuth and elevation of the eye, and what is cut off: the direction, and from which part of the extent on.
-_SCENES = (
-    ("from outside", -70.0, 12.0, (0.0, 0.0, 1.0), math.inf),
-    ("front half cut away", -90.0, 22.0, (0.0, -1.0, 0.0), 0.5),
-    ("upper third cut away", -90.0, 50.0, (0.0, 0.0, 1.0), 0.67),
-)
+# Dark lines on pale colours: the directions are seen without any colour.
+_INK, _WHITE = 0.1, 0.25
+
+# The side of a surface within the wall that is not the outer one.
+_INSIDE = 0.9
+
+# From so far to the right of the front, and so far above, the sections are looked at, in degrees.
+_LENGTHWISE, _ACROSS = (0.0, 22.0), 50.0
 
 
 def fiber_layout(run: StoredRun) -> Figure | None:
-    """The body from outside, cut lengthwise and cut across; None for a run without fibres per element."""
+    """Fibres at epicardium, mid-wall and endocardium from one side, and two sections; None without fibres per element.
+
+    Of a run that does not know the surfaces of its wall the skin is shown in place of the three depths.
+    """
     mesh, fiber = run.mesh, run.initial("fiber")
     if mesh is None or fiber is None or fiber.shape != (mesh.elements, 3):
         return None
+    skin = Skin(mesh)
     sheet = run.initial("sheet")
-    angle = helix_angle(fiber, sheet if sheet is not None and sheet.shape == fiber.shape else _from_axis(mesh))
+    outward = sheet if sheet is not None and sheet.shape == fiber.shape else _from_axis(mesh)
+    angle = helix_angle(fiber, outward)
     # A few odd elements, at an apex say, must not take the colours from all the others.
     limit = float(np.clip(30.0 * np.ceil(np.percentile(np.abs(angle), 98.0) / 30.0), 30.0, 90.0))
-    colors = ScalarMappable(Normalize(-limit, limit), "coolwarm")
+    colors = ScalarMappable(Normalize(-limit, limit), "viridis")
 
-    body = _Painter(mesh, fiber, angle, colors)
-    views = []
-    for _, azimuth, elevation, away, at in _SCENES:
-        along = mesh.points @ np.array(away)
-        views.append(View(azimuth, elevation, away, along.min() + at * np.ptp(along)))
-    rims = [section(mesh.points, body.faces, view.beyond(mesh.points))[0].reshape(-1, 3) for view in views]
-    extents = [view.extent(np.concatenate([mesh.points, rim])) for view, rim in zip(views, rims, strict=True)]
-    half = max(half for _, half in extents)
-    figure = Figure(figsize=(10.0, 3.4), layout=ConstrainedLayoutEngine(h_pad=0.08))
-    axes = figure.subplots(1, len(_SCENES))
-    for axis, (title, *_), view, (middle, _) in zip(axes, _SCENES, views, extents, strict=True):
-        show(axis, view, [body.painted(view)], middle, half)
-        axis.set_title(title, fontsize=11)
-    add_scale_bar(axes[0], views[0], extents[0][0], half)
-    exceeded = np.abs(angle).max() > limit
-    bar = figure.colorbar(colors, ax=axes, shrink=0.75, aspect=28, pad=0.015, extend="both" if exceeded else "neither")
-    bar.set_label("helix angle to the horizontal plane (°)")
-    bar.set_ticks([tick for tick in range(-90, 91, 30) if abs(tick) <= limit])
-    return figure
+    wall = surfaces(run.boundaries)
+    # Nothing but the outer surface says from where a piece of wall is seen from outside.
+    outer = mesh.points[skin.faces if wall is None else wall[1]]
+    outside = facing(0.5 * np.cross(outer[:, 1] - outer[:, 0], outer[:, 2] - outer[:, 0]))
+    layers = {} if wall is None else layers_of_the_wall(skin, outward, angle, *wall)
+    right, above = _LENGTHWISE
+    cuts = {
+        "cut lengthwise": through_wall(mesh.points, outward, right, above),
+        "upper part cut away": short_axis(mesh.points, _ACROSS),
+    }
+    skins = cuts if layers else {"from outside": outside, **cuts}
+    views = [*(outside for _ in layers), *skins.values()]
+    windows = [skin.window(view) for view in views]
+    windows = [window.as_large_as(windows) for window in windows]
+    shown = panels(len(views), 3, windows[0].aspect, below_in=BAR_IN)
+    for axis, title, view, window in zip(shown.axes, [*layers, *skins], views, windows, strict=True):
+        if title in layers:
+            layer = layers[title]
+            drawn = [[_inside(view, layer), *_painted(view, layer, colors, skin.size_mm)]]
+        else:
+            layer = Layer(mesh.points[skin.faces], skin.spread(angle), skin.corner_normals(), fiber[skin.element])
+            body = [*_painted(view, layer, colors, skin.size_mm), skin.edges(view)]
+            drawn = [body, *skin.cut(view, angle, colors)]
+        show(axis, view, drawn, window)
+        axis.set_title(title, fontsize=TITLE_PT)
+    add_scale_bar(shown.axes[0], views[0], windows[0])
+    ticks = [tick for tick in range(-90, 91, 30) if abs(tick) <= limit]
+    extend = "both" if np.abs(angle).max() > limit else "neither"
+    color_bar(shown, colors, "helix angle to the horizontal plane (°)", ticks=ticks, extend=extend)
+    return shown.figure
 
 
 def helix_angle(fiber: Values, outward: Values) -> Values:
@@ -98,16 +117,9 @@ def fiber_lines(corners: Values, directions: Values, spacing_mm: float, length_m
     Ends of the lines in mm, shape (lines, 2, 3), and the face of each.
     """
     centres = corners.mean(axis=1)
-    free = np.ones(len(centres), dtype=bool)
-    near = cKDTree(centres).query_ball_point(centres, spacing_mm)
-    # In the order of the mesh, the lines would stand in rows.
-    for number in np.random.default_rng(0).permutation(len(centres)):
-        if free[number]:
-            free[near[number]] = False
-            free[number] = True
-    face = np.flatnonzero(free)
+    face = thinned(centres, spacing_mm)
     across = np.cross(corners[face, 1] - corners[face, 0], corners[face, 2] - corners[face, 0])
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
     along = directions[face] - np.einsum("ni,ni->n", directions[face], across)[:, None] * across
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
     return centres[face, None] + 0.5 * length_mm * np.array([[-1.0], [1.0]]) * along[:, None], face
@@ -120,31 +132,15 @@ def _from_axis(mesh: Body) -> Values:
     return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12))
 
 
-class _Painter:
-    """The mesh with all that is the same in every view."""
+def _painted(view: View, layer: Layer, colors: ScalarMappable, size_mm: float) -> list[Painted]:
+    """The surface in pale colours, and on it lines along the fibres."""
+    lines, face = fiber_lines(layer.corners, layer.fiber, _SPACING * size_mm, _LENGTH * size_mm)
+    lines = lines[layer.face_normals[face] @ view.axes[2] > _FRONT]
+    surface = shaded(view, layer.corners, layer.angle, layer.normals, colors, white=_WHITE)
+    return [surface, strokes(view, lines, np.full((len(lines), 3), _INK), _WIDTH * size_mm, size_mm / 60)]
 
-    def __init__(self, mesh: Body, fiber: Values, angle: Values, colors: ScalarMappable) -> None:
-        self._mesh, self._angle, self._colors = mesh, angle, colors
-        self._size = float(np.ptp(mesh.points, axis=0).max())
-        self.faces, element = surface(mesh.cells)
-        self._normals = normals(mesh.points, self.faces)
-        self._smooth = smoothing(mesh.points, self.faces)
-        self._edges = sharp_edges(mesh.points, self.faces)
-        self._on_surface = (self._smooth @ angle[element]).reshape(-1, 3)
-        self._lines, self._line_face = fiber_lines(
-            mesh.points[self.faces], fiber[element], _SPACING * self._size, _LENGTH * self._size
-        )
 
-    def painted(self, view: View) -> list[Painted]:
-        """The surface in pale colours, so that the fibres stand out; the cut in full ones, even in each element."""
-        points, faces = self._mesh.points, self.faces
-        corner_normals = (self._smooth @ self._normals).reshape(-1, 3, 3)
-        skin = shaded(view, points[faces], self._on_surface, corner_normals, self._colors, white=0.4)
-        front = (self._normals @ view.axes[2])[self._line_face] > _FRONT
-        rgb = 0.7 * self._colors.to_rgba(self._on_surface.mean(axis=1)[self._line_face[front]])[:, :3]
-        fibers = strokes(view, self._lines[front], rgb, _WIDTH * self._size, self._size / 60)
-        height = view.beyond(points)
-        rim, _ = section(points, faces, height)
-        edges = pen(view, np.concatenate([points[self._edges], rim]), self._size)
-        triangles, element = section(points, self._mesh.cells, height)
-        return [skin, fibers, edges, Painted(triangles, self._colors.to_rgba(self._angle[element])[:, :3])]
+def _inside(view: View, layer: Layer) -> Painted:
+    """The side of a surface within the wall that looks away: without it what is far off would float in the air."""
+    away = layer.corners[layer.face_normals @ view.axes[2] <= 0.0]
+    return Painted(away, np.full((len(away), 3), _INSIDE))

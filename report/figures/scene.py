@@ -6,7 +6,7 @@ behind them. Matplotlib's 3-D axes would do that too, in five times the time.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -18,10 +18,12 @@ from matplotlib.collections import TriMesh
 from matplotlib.tri import Triangulation
 
 from ...orchestrator.participants.participant import Values
+from .layout import TEXT_PT
+from .surface import divided
 
 # Faces are quartered up to so many times: while they are few, where the cut goes through, and where a face has
 # different colours, by this part of the colour bar.
-_ROUNDS, _FEW, _SHADE = 3, 4_000, 0.04
+_ROUNDS, _FEW, _SHADE = 3, 2_000, 0.04
 
 # Lines are cut into so many pieces.
 _PARTS = 4
@@ -30,7 +32,7 @@ _PARTS = 4
 _LIGHT = np.array([-0.35, 0.35, 0.87]) / np.linalg.norm([-0.35, 0.35, 0.87])
 
 # Brightness in full shadow; high, because the colour carries the value and must be read everywhere.
-_AMBIENT = 0.7
+_AMBIENT = 0.75
 
 # The axes reach a little farther than what is shown.
 _MARGIN = 1.04
@@ -70,18 +72,44 @@ class View:
         """Distance beyond the cut in mm of points of shape (..., 3); negative for what is shown."""
         return np.asarray(points @ np.array(self.away) - self.cut_mm)
 
-    def extent(self, points: Values) -> tuple[Values, float]:
-        """Middle, shape (3,), and half the larger side of the picture of `points`, shape (n, 3), all in mm.
-
-        Points beyond the cut do not count, those on its rim do.
-        """
+    def window(self, points: Values) -> "Window":
+        """What the picture of `points`, shape (n, 3), takes; those beyond the cut do not count, those on its rim do."""
         seen = points[self.beyond(points) <= 1e-6] @ self.axes.T
         low, high = seen.min(axis=0), seen.max(axis=0)
-        return 0.5 * (low + high) @ self.axes, 0.5 * float((high - low)[:2].max())
+        half_width, half_height, _ = 0.5 * (high - low)
+        return Window(0.5 * (low + high) @ self.axes, float(half_width), float(half_height))
+
+
+class Window(NamedTuple):
+    """Part of space that a picture shows: its middle, shape (3,), and half its width and height, in mm."""
+
+    middle: Values
+    half_width_mm: float
+    half_height_mm: float
+
+    def as_large_as(self, others: Iterable["Window"]) -> "Window":
+        """Around the same middle, as wide and as high as the largest: pictures side by side then have one scale."""
+        largest = [max(sides) for sides in zip(*(other[1:] for other in (self, *others)), strict=True)]
+        return Window(self.middle, *largest)
+
+    def with_margin(self, margin_mm: float) -> "Window":
+        """Larger by `margin_mm` on every side."""
+        return Window(self.middle, self.half_width_mm + margin_mm, self.half_height_mm + margin_mm)
+
+    @property
+    def aspect(self) -> float:
+        """Height over width."""
+        return self.half_height_mm / self.half_width_mm
 
 
 def shaded(
-    view: View, corners: Values, values: Values, normals: Values, colors: ScalarMappable, white: float = 0.0
+    view: View,
+    corners: Values,
+    values: Values,
+    normals: Values,
+    colors: ScalarMappable,
+    white: float = 0.0,
+    levels: Sequence[float] = (),
 ) -> Painted:
     """Faces of a closed surface that face the eye, lit, in small pieces.
 
@@ -97,14 +125,18 @@ def shaded(
         The colours of the values.
     white:
         Share of white in all colours.
+    levels:
+        Where colours change, if they do in bands: the faces are divided there.
     """
     brightness = _AMBIENT + (1.0 - _AMBIENT) * np.clip(normals @ (_LIGHT @ view.axes), 0.0, 1.0)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     pieces = np.concatenate([corners, values[..., None], brightness[..., None]], axis=2)[across @ view.axes[2] > 0.0]
+    pieces = divided(pieces, 3, levels)
     for _ in range(_ROUNDS):
         beyond = view.beyond(pieces[..., :3])
         split = (beyond.min(axis=1) < 0.0) & (beyond.max(axis=1) > 0.0) | (len(pieces) < _FEW)
-        split |= np.ptp(pieces[..., 3], axis=1) > _SHADE * np.ptp(colors.get_clim())
+        if not len(levels):
+            split |= np.ptp(pieces[..., 3], axis=1) > _SHADE * np.ptp(colors.get_clim())
         coarse = pieces[split]
         middles = 0.5 * (coarse + np.roll(coarse, -1, axis=1))
         tips = [np.stack([coarse[:, i], middles[:, i], middles[:, i - 1]], axis=1) for i in range(3)]
@@ -138,19 +170,21 @@ def strokes(view: View, lines: Values, rgb: Values, width_mm: float, lift_mm: fl
     return Painted(np.concatenate([first, second]), np.concatenate([rgb, rgb]))
 
 
-def pen(view: View, lines: Values, size_mm: float) -> Painted:
-    """Lines of shape (lines, 2, 3) in mm that mark the edges of a body of the given size."""
-    return strokes(view, lines, np.full((len(lines), 3), 0.2), size_mm / 330, size_mm / 50)
+def pen(view: View, lines: Values, size_mm: float, grey: float = 0.2) -> Painted:
+    """Lines of shape (lines, 2, 3) in mm that mark the edges of a body of this size; `grey` is their brightness."""
+    return strokes(view, lines, np.full((len(lines), 3), grey), size_mm / 330, size_mm / 50)
 
 
-def show(axis: Axes, view: View, layers: Sequence[Sequence[Painted]], middle: Values, half_mm: float) -> None:
-    """Draw on axes that reach `half_mm` from `middle` to each side; later layers cover earlier ones.
+def show(axis: Axes, view: View, layers: Sequence[Sequence[Painted]], window: Window) -> None:
+    """Draw what `window` shows on `axis`; later layers cover earlier ones.
 
     Within a layer, what is nearer to the eye covers what is farther, by the centres of the triangles.
     """
     right, upward, toward = view.axes
     for zorder, layer in enumerate(layers):
         corners, rgb = (np.concatenate(parts) for parts in zip(*layer, strict=True))
+        if not len(corners):
+            continue
         order = np.argsort(corners.mean(axis=1) @ toward, kind="stable")
         flat = corners[order].reshape(-1, 3)
         triangles = Triangulation(flat @ right, flat @ upward, np.arange(len(flat)).reshape(-1, 3))
@@ -159,18 +193,28 @@ def show(axis: Axes, view: View, layers: Sequence[Sequence[Painted]], middle: Va
         mesh = TriMesh(triangles, zorder=zorder)
         mesh.set_facecolor(np.repeat(rgb[order], 3, axis=0))
         axis.add_collection(mesh, autolim=False)
-    reach = _MARGIN * half_mm
-    center = middle @ right, middle @ upward
-    axis.set(xlim=(center[0] - reach, center[0] + reach), ylim=(center[1] - reach, center[1] + reach), aspect="equal")
+    x, y = window.middle @ right, window.middle @ upward
+    half_width, half_height = _MARGIN * window.half_width_mm, _MARGIN * window.half_height_mm
+    axis.set(xlim=(x - half_width, x + half_width), ylim=(y - half_height, y + half_height), aspect="equal")
     # Ticks are not shown, but would be laid out all the same.
-    axis.set(xticks=[], yticks=[])
+    for side in (axis.xaxis, axis.yaxis):
+        side.set_visible(False)
     axis.set_axis_off()
 
 
-def add_scale_bar(axis: Axes, view: View, middle: Values, half_mm: float) -> None:
-    """A bar of a round length in the lower left of the picture."""
+def add_scale_bar(axis: Axes, view: View, window: Window) -> None:
+    """A bar of a round length below the picture, on the left."""
     right, upward, _ = view.axes
-    length = max((bar for bar in _BARS_MM if bar <= half_mm / 3.0), default=_BARS_MM[0])
-    start, height = middle @ right - 0.95 * half_mm, middle @ upward - 0.85 * half_mm
-    axis.plot([start, start + length], [height, height], color="black", linewidth=2.0, zorder=9)
-    axis.text(start + 0.5 * length, height - 0.03 * half_mm, f"{length:g} mm", ha="center", va="top")
+    length = max((bar for bar in _BARS_MM if bar <= window.half_width_mm / 2.0), default=_BARS_MM[0])
+    start = window.middle @ right - window.half_width_mm
+    height = window.middle @ upward - 1.1 * window.half_height_mm
+    axis.plot([start, start + length], [height, height], color="black", linewidth=3.0, clip_on=False)
+    axis.annotate(
+        f"{length:g} mm",
+        (start + length, height),
+        (5, 0),
+        textcoords="offset points",
+        annotation_clip=False,
+        fontsize=TEXT_PT,
+        va="center",
+    )

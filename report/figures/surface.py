@@ -1,6 +1,7 @@
 """The surface of a body of tetrahedra: faces, normals, edges, and its section by a plane."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +28,11 @@ def surface(cells: Numbers) -> tuple[Numbers, Numbers]:
 def section(points: Values, simplices: Numbers, height: Values) -> tuple[Values, Numbers]:
     """Where `height`, shape (nodes,), is zero in tetrahedra, shape (n, 4), or in triangles, shape (n, 3).
 
-    Returns triangles, shape (m, 3, 3), or lines, shape (m, 2, 3), in mm, and the number of the simplex of each.
+    Returns triangles, shape (m, 3, columns), or lines, shape (m, 2, columns), and the number of the simplex of each.
+    `points` has places in mm in its first three columns; what stands in others is interpolated like them.
     """
     size = simplices.shape[1]
-    parts, numbers = [np.empty((0, size - 1, 3))], [np.empty(0, dtype=np.int64)]
+    parts, numbers = [np.empty((0, size - 1, points.shape[1]))], [np.empty(0, dtype=np.int64)]
     above = (height[simplices] > 0.0).sum(axis=1)
     for count in range(1, size):
         number = np.flatnonzero(above == count)
@@ -44,6 +46,24 @@ def section(points: Values, simplices: Numbers, height: Values) -> tuple[Values,
             parts.append(crossings[:, first : first + size - 1])
             numbers.append(number)
     return np.concatenate(parts), np.concatenate(numbers)
+
+
+def divided(pieces: Values, column: int, levels: Sequence[float]) -> Values:
+    """Triangles, shape (n, 3, columns), cut along the lines where `column` has one of the values `levels`."""
+    for level in levels:
+        above = pieces[..., column] - level
+        crossed = (above.min(axis=1) < 0.0) & (above.max(axis=1) > 0.0)
+        whole, above = pieces[crossed], above[crossed]
+        # One corner is alone on its side; the order of the others stays, and with it the direction of the normal.
+        alone = np.where((above > 0.0).sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
+        order = (alone[:, None] + np.arange(3)) % 3
+        tip, left, right = np.take_along_axis(whole, order[..., None], axis=1).transpose(1, 0, 2)
+        height, left_height, right_height = np.take_along_axis(above, order, axis=1).T
+        on_left = tip + (height / (height - left_height))[:, None] * (left - tip)
+        on_right = tip + (height / (height - right_height))[:, None] * (right - tip)
+        parts = [(tip, on_left, on_right), (on_left, left, right), (on_left, right, on_right)]
+        pieces = np.concatenate([pieces[~crossed], *(np.stack(part, axis=1) for part in parts)])
+    return pieces
 
 
 def normals(points: Values, faces: Numbers) -> Values:

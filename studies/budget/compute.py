@@ -35,7 +35,7 @@ def error_budget(variants: Variants, bench: Bench, known: StoredRun | None = Non
     runs = Runs(variants, bench, known)
     values = runs.base().values
     if not values:
-        raise InputError("the scenario records no number whose error could be told; see `output` in the scenario")
+        raise InputError("the scenario records no number whose error could be estimated; see `output` in the scenario")
     runs.run(_settings(sources, (BASE, FINER, COARSER)), "finer in one source each")
     unclear = [source for source in sources if _is_open(source, values, runs)]
     finest = [source for source in unclear if _predicted_s(source, runs) <= _LONGEST_S]
@@ -130,4 +130,4 @@ def _help(source: Source, values: Mapping[int, float], reasons: Mapping[int, str
         return [source.remedy]
     minutes = _predicted_s(source, runs) / 60.0
     run = source.levels[FINEST]
-    return [f"a run with {run} would help, which takes about {minutes:.0f} minutes and was not made", source.remedy]
+    return [f"a run with {run} would help; it takes about {minutes:.0f} minutes and was not made", source.remedy]

@@ -76,7 +76,7 @@ def _order(before: float, after: float, ratio: float, highest: float, noise: flo
     """The order from two differences of successive values, if there is one, and why it is not to be trusted, if so."""
     pair = f"{_told(before)}, then {_told(after)}"
     if abs(after) <= noise:
-        return None, f"the differences end in round-off ({pair}), faster than by any order"
+        return None, f"the differences fall to round-off at once ({pair}), faster than any order of accuracy predicts"
     if before * after <= 0.0:
         return None, f"the values change back and forth as they are refined ({pair}), outside the asymptotic range"
     if abs(after) >= abs(before):
@@ -85,7 +85,7 @@ def _order(before: float, after: float, ratio: float, highest: float, noise: flo
     if order < _LOWEST_ORDER:
         return order, f"the differences hardly shrink ({pair}), outside the asymptotic range"
     if order > highest:
-        return order, f"the differences shrink faster than the method can converge ({pair}), by chance"
+        return order, f"the differences shrink faster than the method can converge ({pair}), which is chance"
     return order, ""
 
 
@@ -96,7 +96,7 @@ def _disagreement(before: float, middle: float, after: float) -> str:
         return f"the coarser run shows no order ({_told(before)}, then {_told(middle)}), outside the asymptotic range"
     coarse, fine = middle / (1.0 - middle / before), middle / (1.0 - after / middle)
     if max(coarse / fine, fine / coarse) > _AGREEMENT:
-        return f"the coarser runs say {_told(coarse)} and the finer ones {_told(fine)}, outside the asymptotic range"
+        return f"the coarser runs give {_told(coarse)} and the finer ones {_told(fine)}, outside the asymptotic range"
     return ""
 
 

@@ -15,4 +15,7 @@ def sources_of(scenario: Scenario) -> list[Source]:
 def unknown_sources(scenario: Scenario) -> list[str]:
     """Sentences about errors that cannot be told, because nothing is known that would make them smaller."""
     foreign = [name for name, entry in scenario.units.items() if entry.fmu is not None]
-    return [f"'{name}' is an FMU: what error it makes inside its steps is not part of the budget" for name in foreign]
+    return [
+        f"'{name}' is an FMU: the error that it makes inside its steps is unknown and not part of the budget"
+        for name in foreign
+    ]

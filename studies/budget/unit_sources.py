@@ -35,8 +35,8 @@ def other_meshes(scenario: Scenario) -> Source | None:
         else:
             finer = {key: inner + level for key, inner in own.items()}
             levels[level] = Level(scene, finer if own else None)
-    less = ", less what that changes for the units that can refine their own mesh" if own else ""
-    other = "take a smaller `scene.mesh_size_mm`" if scenario.scene.mesh is None else "bring a finer mesh"
+    less = ", minus the change in the units that can refine their own mesh" if own else ""
+    other = "take a smaller `scene.mesh_size_mm`" if scenario.scene.mesh is None else "give a finer mesh"
     return Source(
         _shared(scenario) if own else "mesh",
         f"`scene.refine` + 1{less}",

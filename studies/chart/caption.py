@@ -6,8 +6,8 @@ from .chart import WALL, Chart
 from .panel import Panel
 
 _COSTS = {
-    True: "Seconds are of the wall clock; each point ran alone on its core.",
-    False: "Seconds are of processor time, because points ran beside others.",
+    True: "Seconds are wall-clock seconds; each point ran alone on its core.",
+    False: "Seconds are CPU seconds, because several points ran at the same time.",
 }
 
 

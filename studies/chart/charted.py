@@ -26,7 +26,9 @@ def chart_study(plan: Plan, bench: Bench) -> Chart:
     }
     rows = [row for line in lines.values() for row in line]
     if not any(row.is_done for row in rows):
-        raise InputError(f"{plan.origin}: no point came to its end, the first because of: {rows[0].reason}")
+        raise InputError(
+            f"{plan.origin}: no point was run to its end; the first one failed because of: {rows[0].reason}"
+        )
     return comparison.chart(plan.study.name, plan.study.scenario, lines)
 
 

@@ -117,9 +117,9 @@ def _notes(chosen: Sequence[Measure], compared: Sequence[Measure], rows: Sequenc
     notes = []
     left_out = [measure.name for measure in chosen if measure not in compared]
     if left_out:
-        notes.append(f"not compared, for no point has the reference's mesh: {', '.join(left_out)}")
+        notes.append(f"not compared, because no point has the mesh of the reference: {', '.join(left_out)}")
     if not alone:
-        notes.append("points ran beside others, so that processor seconds are compared")
+        notes.append("several points ran at the same time, so CPU seconds are compared")
     tried = [row for row in rows if row.status != PRUNED]
     missing = sum(not row.is_done for row in tried)
     if missing:

@@ -127,11 +127,11 @@ def _below(chart: Chart, notes: Footnotes, width: float) -> list[str]:
     texts = [f"{number}: {text}" for number, text in enumerate(notes.texts, start=1)]
     if len(texts) > _MOST_NOTES:
         left_out = len(texts) - _MOST_NOTES
-        texts = [*texts[:_MOST_NOTES], f"{left_out} more reasons stand in the table and on the page of this chart."]
+        texts = [*texts[:_MOST_NOTES], f"{left_out} more reasons are in the table and on the page of this chart."]
     caption = [reference_text(chart), cost_text(chart)]
     if any(line.orders for line in chart.lines):
         caption.append(
-            "The order is the observed order of accuracy: the power of the varied number by which the error grows."
+            "The order is the observed order of accuracy: the error grows as this power of the varied number."
         )
     caption += [machine_text(chart.machine), *note_texts(chart.notes)]
     caption = [shortened(text, _LONGEST) for text in caption if text]

@@ -28,17 +28,17 @@ def page(chart: Chart) -> str:
     sentences += note_texts(chart.notes)
     about = "\n".join(f"<li>{safe(text)}</li>" for text in sentences if text)
     body = f"""<p>Every point is a run of the scenario <code>{safe(Path(chart.scenario).name)}</code> with other
-settings. Lower is more accurate, farther left is cheaper. Full markers are on the front, for no point is both cheaper
-and as accurate; hollow ones are dominated. The order is the observed order of accuracy: the power of the varied number
-by which the error grows. Arrows at an edge are errors that are infinite or exactly zero; a cross is a point without a
-result. Hover over a point for all that is known of it; click a name to hide a line.</p>
+settings. Lower is more accurate, farther left is cheaper. Full markers are on the front: no other point is both cheaper
+and as accurate. Hollow markers are dominated by another point. The order is the observed order of accuracy: the error
+grows as this power of the varied number. Arrows at an edge mark errors that are infinite or exactly zero; a cross marks
+a point without a result. Hover over a point to see its data; click a name to hide a line.</p>
 <ul>
 {about}
 </ul>
 {embedded(plot(chart), "chart")}
 <h2>All points</h2>
 {_table(chart)}
-<p>Bold: on the front.</p>"""
+<p>Errors in bold are on the front of their measure.</p>"""
     return document(f"{chart.name}: error against cost", body, _STYLE)
 
 

@@ -14,7 +14,7 @@ SOLVES = "solves"
 
 _LABELS = {
     WALL: "seconds of wall clock, alone on its core",
-    CPU: "seconds of processor time",
+    CPU: "seconds of CPU time",
     SOLVES: "solves (steps of all units together)",
 }
 

@@ -72,4 +72,4 @@ class Accuracy:
 
 
 def _told(measure: Measure, error: float, allowed: float) -> str:
-    return f"{measure.name} errs by {f'{error:.3g} {measure.unit}'.rstrip()}, allowed are {allowed:g}"
+    return f"the error in {measure.name} is {f'{error:.3g} {measure.unit}'.rstrip()}, the tolerance {allowed:g}"

@@ -1,4 +1,4 @@
-"""What is said around the pictures of a map: what its axes are, what theory says and what is called inaccurate."""
+"""The text around the pictures of a map: its axes, what theory predicts, and what counts as inaccurate."""
 
 from math import isfinite
 from pathlib import Path
@@ -17,10 +17,10 @@ def title(found: StabilityMap) -> str:
 
 def axes_text(found: StabilityMap) -> str:
     """The whole keys of the axes; of each panel where they differ."""
-    texts = {panel.name: f"{panel.x_key} to the right and {panel.y_key} upwards" for panel in found.panels}
+    texts = {panel.name: f"x axis {panel.x_key}, y axis {panel.y_key}" for panel in found.panels}
     if len(set(texts.values())) == 1:
-        return f"Every box stands for a run, with {next(iter(texts.values()))}."
-    return f"Every box stands for a run. {'; '.join(f'{name}: {text}' for name, text in texts.items())}."
+        return f"Every box is one run; {next(iter(texts.values()))}."
+    return f"Every box is one run. {'; '.join(f'{name}: {text}' for name, text in texts.items())}."
 
 
 def theory_text(found: StabilityMap, placed: list[PlacedPanel]) -> str:
@@ -47,8 +47,8 @@ def tolerance_text(found: StabilityMap) -> str:
     """From which error on a run is inaccurate; empty without tolerances."""
     if not found.tolerances:
         return ""
-    said = [f"{name} errs by more than {limit:g} {unit_of(name)}".rstrip() for name, limit in found.tolerances.items()]
-    return f"Inaccurate: {' or '.join(said)}."
+    said = [f"in {name} of more than {limit:g} {unit_of(name)}".rstrip() for name, limit in found.tolerances.items()]
+    return f"Inaccurate: an error {' or '.join(said)}."
 
 
 def reference_text(found: StabilityMap) -> str:

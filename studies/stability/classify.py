@@ -131,7 +131,9 @@ def _of_fields(summary: Mapping[str, Any]) -> _Growth:
             if kind == _GROWING:
                 return _Growth(rate, f"{alternates} and grows by a factor of {rate:.4g} per step", True, True)
             if kind == _RINGING and _lasts(entry, summary):
-                return _Growth(rate, f"{alternates} and rings on, by a factor of {rate:.4g} per step", False, True)
+                return _Growth(
+                    rate, f"{alternates} and keeps ringing, with a factor of {rate:.4g} per step", False, True
+                )
             return _Growth(rate)
     return _Growth()
 

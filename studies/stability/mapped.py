@@ -190,15 +190,15 @@ class _Mapping:
         bugs = sum(cell.reason.startswith(BUG) for cell in cells)
         if bugs:
             notes.append(
-                f"{bugs} of {len(cells)} cells ended by an error in this program; their reasons begin with '{BUG}'"
+                f"{bugs} of {len(cells)} cells ended with an error in this program; their reasons begin with '{BUG}'"
             )
         if len(self._study.references) > 1:
             notes.append("errors are taken from the first reference; the second one is not run for a map")
         silent = sum(cell.predicted is None and cell.trial is not None for cell in cells)
         if self._predictor is not None and silent:
             notes.append(
-                f"theory says nothing of {silent} of {len(cells)} cells: it is of explicit coupling with equal steps, "
-                "or comes to no result there"
+                f"theory predicts nothing for {silent} of {len(cells)} cells: it applies to explicit coupling with "
+                "equal steps only, or has no result there"
             )
         return notes
 

@@ -101,7 +101,7 @@ def fitted_modes(columns: Mapping[str, Values]) -> Modes:
     time = columns.get("time_ms", np.empty(0))
     moving = [values for name, values in columns.items() if name != "time_ms" and _moves(values)]
     if not moving:
-        return Modes(None, why="nothing in its time series moves, so that no modes can be fitted")
+        return Modes(None, why="nothing in its time series moves, so no modes can be fitted")
     rows = np.column_stack(moving)
     beyond = (np.abs(np.nan_to_num(rows)) > _LARGEST).any(axis=1)
     end = int(beyond.argmax()) if beyond.any() else len(rows)
@@ -110,7 +110,7 @@ def fitted_modes(columns: Mapping[str, Values]) -> Modes:
     time, rows = time[:end][known], rows[:end][known]
     steps = np.diff(time)
     if len(steps) and np.ptp(steps) > _EQUAL * steps.max():
-        return Modes(None, why="its steps differ, so that no modes can be fitted")
+        return Modes(None, why="its steps differ, so no modes can be fitted")
     rows = rows[_STARTING:]
     # Columns of every size count alike.
     rows = rows / np.where(np.abs(rows).max(axis=0, initial=0.0) > 0.0, np.abs(rows).max(axis=0, initial=0.0), 1.0)
@@ -128,7 +128,8 @@ def fitted_modes(columns: Mapping[str, Values]) -> Modes:
         return Modes(None, why="its time series is too short for modes to be fitted")
     if best.misfit > _LINEAR:
         return Modes(
-            None, why=f"its time series is no linear recurrence (misfit {best.misfit:.1g}), so that it has no modes"
+            None,
+            why=f"its time series is not a linear recurrence (misfit {best.misfit:.1g}), so no modes can be fitted",
         )
     return _dominant(best)
 

@@ -58,7 +58,7 @@ def page(found: StabilityMap) -> str:
 <div class="{"panels" if len(placed) > 1 else "one"}">
 {panels}
 </div>
-<p>Hover over a box for all that is known of its run; in brackets stand the numbers of cells.</p>
+<p>Hover over a box to see the data of its run. The numbers in brackets count the cells.</p>
 <ul>
 {about}
 </ul>
@@ -117,7 +117,7 @@ def _name(kind: str) -> str:
 
 def _table(found: StabilityMap) -> str:
     keys = list(dict.fromkeys((panel.x_key, panel.y_key) for panel in found.panels))
-    axes = keys[0] if len(keys) == 1 else ("to the right", "upwards")
+    axes = keys[0] if len(keys) == 1 else ("x axis", "y axis")
     measures = list(dict.fromkeys(name for each in found.cells for name in each.errors))
     head = ["line", *axes, "class", "measured growth", "predicted growth"]
     head += [*(f"error in {name}" for name in measures), "wall clock", "run of the bisection", "reason"]

@@ -16,7 +16,7 @@ def hover_text(panel: Panel, cell: Cell) -> str:
         said.append(safe_lines(cell.reason, LETTERS))
     said.append(f"measured growth: {growth_text(cell.measure)}")
     said.append(f"predicted growth: {growth_text(cell.predicted)}")
-    said += [safe_lines(f"{name}: errs by {error_text(name, error)}", LETTERS) for name, error in cell.errors.items()]
+    said += [safe_lines(f"error in {name}: {error_text(name, error)}", LETTERS) for name, error in cell.errors.items()]
     said.append(f"wall clock: {wall_text(cell)}")
     if cell.bisected:
         said.append("run of the bisection")

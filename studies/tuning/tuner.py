@@ -23,7 +23,7 @@ _STEP, _EVERY = "coupling.step_ms", "output.every_ms"
 
 #: Wall clock over processor seconds from which on a machine counts as busy with something else; no time is below that.
 _BUSY, _LEAST_S = 1.3, 1e-3
-_BUSY_NOTE = "the machine was busy with something else, so that seconds of the processor are compared, not of the clock"
+_BUSY_NOTE = "the machine was busy with other programs, so CPU seconds are compared instead of wall-clock seconds"
 
 #: The part of a tolerance that the reference may err by itself.
 _TRUSTED = 1.0 / 3.0
@@ -151,7 +151,7 @@ def _doubts(comparison: Comparison) -> list[str]:
         unsure = comparison.uncertainty.get(name)
         if unsure is not None and not unsure <= _TRUSTED * limit:
             notes.append(
-                f"the reference errs by {unsure:.3g} itself in {name}, which is more than a third of the tolerance "
-                f"{limit:g}: what is near the tolerance may be on either side of it; give a finer one in a study"
+                f"the uncertainty of the reference in {name} is {unsure:.3g}, more than a third of the tolerance "
+                f"{limit:g}: a point near the tolerance may be on either side of it; give a finer reference in a study"
             )
     return notes

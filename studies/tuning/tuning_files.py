@@ -38,11 +38,11 @@ def _comment(tuning: Tuning, best: int) -> str:
     where = f"{here['processor']}, {here['cores']} cores, {here['system']}, Python {here['python']}"
     common = ", ".join(f"{key}={value_text(value)}" for key, value in tuning.task.common.items())
     sentences = [
-        f"Tuned from {tuning.task.file.name}: the cheapest setting that was found to keep {kept(tuning)}.",
-        f"Errors: {errors_told(tuning, tuning.rows[best])}, from the reference {tuning.chart.references[0]}.",
-        f"Cost: {compared_costs(tuning, best)}; measured on {where}.",
-        *([f"With {common}, as all that it was compared with."] if common else []),
-        "All that was considered is in tune.csv.",
+        f"Tuned from {tuning.task.file.name}: the cheapest setting found that keeps {kept(tuning)}.",
+        f"Errors: {errors_told(tuning, tuning.rows[best])}, against the reference {tuning.chart.references[0]}.",
+        f"Cost: {compared_costs(tuning, best)}, measured on {where}.",
+        *([f"With {common}, like all settings with which it was compared."] if common else []),
+        "All settings that were considered are in tune.csv.",
     ]
     lines = [line for sentence in sentences for line in textwrap.wrap(sentence, _WIDTH, break_on_hyphens=False)]
     return "".join(f"# {line}\n" for line in lines)

@@ -115,7 +115,7 @@ def test_stopped_by_a_signal_it_goes_on_from_that_very_step(number: int, small_s
     process.send_signal(number)
     _, message = process.communicate(timeout=120)
     assert process.returncode == 128 + number
-    assert "to be continued with --resume" in message
+    assert "continue with --resume" in message
     # Without the header and the initial state.
     reached = _rows(out) - 2
     assert 4 <= reached < 40

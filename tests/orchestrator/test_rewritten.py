@@ -58,6 +58,14 @@ def test_paths_lead_to_the_same_files_from_the_new_folder(file: Path) -> None:
     assert (path.parent / tuned.inputs.file).resolve() == file.parent.parent / "signals.csv"
 
 
+def test_an_editor_finds_the_schema_from_the_new_folder(file: Path) -> None:
+    line = "# yaml-language-server: $schema="
+    for path, expected in (("schema/s.json", "../../scenarios/schema/s.json"), ("https://x.org/s", "https://x.org/s")):
+        file.write_text(f"{line}{path}\n{_TEXT}")
+        text, _ = _written(file, {})
+        assert text.splitlines()[0] == f"{line}{expected}"
+
+
 def test_settings_are_those_that_were_asked_for(file: Path) -> None:
     settings = {
         "coupling.iterate": None,

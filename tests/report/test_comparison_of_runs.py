@@ -11,6 +11,7 @@ from cardiac_cosim.orchestrator.errors import InputError
 from cardiac_cosim.report.comparison.compared import opened
 from cardiac_cosim.report.comparison.comparison_page import write_page
 from cardiac_cosim.report.comparison.comparison_table import write_table
+from cardiac_cosim.report.comparison.side_by_side import side_by_side
 
 
 def _run(folder: Path, volumes: list[float], apex_ms: float | None, step_ms: float, **more: object) -> Path:
@@ -95,3 +96,24 @@ def test_what_cannot_be_compared_is_refused_with_a_remedy(case: str, pair: list[
     folders = {"one": pair[:1], "twice": [pair[0], pair[0]], "nothing": [pair[0], tmp_path]}[case]
     with pytest.raises(InputError, match="give"):
         opened(folders)
+
+
+def test_bodies_are_side_by_side_at_times_that_all_runs_have(tmp_path: Path) -> None:
+    runs = []
+    for name, times in (("one", [0.0, 5.0, 10.0]), ("two", [0.0, 10.0, 20.0])):
+        folder = _run(tmp_path / name, [40.0, 30.0], None, 1.0)
+        with h5py.File(folder / "fields.h5", "w") as file:
+            file["points_mm"], file["cells"] = np.vstack([np.zeros(3), 10.0 * np.eye(3)]), [[0, 1, 2, 3]]
+            file["frames_ms"] = times
+            file["frames/potential_mV"] = np.linspace(-80.0, 20.0, 12).reshape(3, 4)
+        runs.append(folder)
+    compared = opened(runs)
+    picture = side_by_side(compared)
+    assert picture is not None
+    assert picture.startswith(b"\x89PNG")
+    page = write_page(compared, tmp_path, "title").read_text()
+    assert "data:image/png;base64," in page
+    # With no time in common there is nothing to put side by side, and no picture of different moments.
+    with h5py.File(runs[1] / "fields.h5", "a") as file:
+        file["frames_ms"][:] = [0.0, 11.0, 21.0]
+    assert side_by_side(opened(runs)) is None

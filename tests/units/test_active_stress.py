@@ -41,8 +41,8 @@ def test_seeds_delay_is_the_printed_one_and_negative_when_depolarised() -> None:
 
 
 def test_plateau_is_about_half_a_megapascal(cube, started) -> None:
-    # Independent computation (model.md, Active stress): plateau 0.498 MPa, the target at a potential just below the
-    # peak of 19.95 mV; reached within 1 % after 5 ms, five times 1/ε₁.
+    # Independent computation (docs/model.md, Active stress): plateau 0.498 MPa, the target at a potential just below
+    # the peak of 19.95 mV; reached within 1 % after 5 ms, five times 1/ε₁.
     unit = started(ActiveStress, cube, potential=np.full(cube.nodes, 19.6))
     unit.do_step(0.0, 0.005)
     np.testing.assert_allclose(unit.get("active_stress"), 498.0, rtol=0.01)

@@ -83,7 +83,7 @@ def test_volume_scales_with_the_cube_of_the_length(two_chambers) -> None:
 
 
 def test_hearts_cavities_are_the_closed_forms(heart) -> None:
-    # Closed forms 39.358 and 13.452 ml (model.md, Geometry), facetted at 5 mm: within 2 %.
+    # Closed forms 39.358 and 13.452 ml (docs/model.md, Geometry), facetted at 5 mm: within 2 %.
     anatomy = Biventricle()
     volumes = [_volume(heart, names, heart.points) for names in (_LV, _RV)]
     assert volumes == pytest.approx([39.358, 13.452], rel=0.02)

@@ -3,7 +3,7 @@
     M dφ/dt = −(K + G) φ + G φ_s + f(φ, states),   dstates/dt = ionic rates
 
 M mass, K diffusion with D = d_iso I + d_ani a₀⊗a₀, G the mass weighted per element with the conductance
-G_s max(λ − 1, 0)/β_t, and f the load of the ionic current (model.md, Electrophysiology).
+G_s max(λ − 1, 0)/β_t, and f the load of the ionic current (docs/model.md, Electrophysiology).
 
 λ is constant per element and enters so: averaged to nodes first, it costs 5 ms of activation time at the apex of a
 5 mm mesh. φ_s enters through G's row sums, so that a uniform φ = φ_s is a rest state of the stretch current.

@@ -13,7 +13,7 @@ PROBED = ("potential_probe_1", "potential_probe_2", "potential_probe_3")
 
 @dataclass(frozen=True)
 class Probes:
-    """Where the probes are; the defaults are at the base, in the middle and near the apex of the heart (model.md).
+    """Where the probes are; the defaults are at the base, in the middle and near the apex of the heart (docs/model.md).
 
     A probe outside of the mesh, as in scenes smaller than the heart, shows the potential at the nearest place of it.
     """

@@ -1,4 +1,4 @@
-"""The initial stimulus: a potential set on the nodes in a box at the base (model.md, Electrophysiology)."""
+"""The initial stimulus: a potential set on the nodes in a box at the base (docs/model.md, Electrophysiology)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

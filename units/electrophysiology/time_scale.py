@@ -1,4 +1,4 @@
-"""The time scale β_t of the ionic model, by the expected time of activation (model.md, Electrophysiology)."""
+"""The time scale β_t of the ionic model, by the expected time of activation (docs/model.md, Electrophysiology)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

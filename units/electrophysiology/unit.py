@@ -8,7 +8,7 @@ solver extrapolates its next initial guess.
 
 The inputs are the stretch λ of the elements, held over a step or varying linearly (each substep then uses its value in
 the middle of the substep), and the fibre directions, which are set once. The outputs are the transmembrane potential
-and the activation time at the nodes, and the potential at three probes. Source: model.md, Electrophysiology.
+and the activation time at the nodes, and the potential at three probes. Source: docs/model.md, Electrophysiology.
 
 With `refine` the unit solves on a nested refinement of the mesh of the scene. A refined element has the fibre and the
 stretch of the element in which it lies; potential and activation time are given at the nodes of the scene's mesh.

@@ -1,4 +1,4 @@
-"""The fibre generator unit: static fibre and sheet directions from the anatomy (model.md, Fibre generator).
+"""The fibre generator unit: static fibre and sheet directions from the anatomy (docs/model.md, Fibre generator).
 
 The sheet direction s₀ points through the wall, from endocardium to epicardium. The fibre lies in the plane normal to
 s₀, at the angle θ from the horizontal. Through the wall, θ varies linearly between its values at the two surfaces, and

@@ -1,4 +1,4 @@
-"""The biventricular anatomy of model.md: two truncated ellipsoids grown together."""
+"""The biventricular anatomy of docs/model.md: two truncated ellipsoids grown together."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Exact volumes of pieces of concentric, axis-parallel ellipsoids (model.md, Geometry)."""
+"""Exact volumes of pieces of concentric, axis-parallel ellipsoids (docs/model.md, Geometry)."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The left ventricle alone: one truncated ellipsoid (model.md, Geometry)."""
+"""The left ventricle alone: one truncated ellipsoid (docs/model.md, Geometry)."""
 
 from dataclasses import dataclass
 

@@ -5,7 +5,7 @@
 The strain energy and the variables are those of finite-element mechanics (`unit`), for scenes of any dimension. With
 `free`, each element contracts as a cube without any support; with `isometric`, its fibre keeps its length and the two
 other directions are free. For a homogeneous cube without support, finite elements give the same result. Source:
-model.md, Mechanics.
+docs/model.md, Mechanics.
 
 How it fails: if no equilibrium is found, not even in many small increments of the active stress, the step ends with
 StepFailure.

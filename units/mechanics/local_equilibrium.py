@@ -2,7 +2,7 @@
 
     2∂W/∂C_ii + s_a share_i = 0
 
-Of a fibre that is held, the first equation is left out. Source: model.md, Mechanics.
+Of a fibre that is held, the first equation is left out. Source: docs/model.md, Mechanics.
 """
 
 from collections.abc import Sequence

@@ -6,7 +6,8 @@ Displacement fixed on `base`, no inertia. Inputs: the active stress at the nodes
 stiffness and the stretch it holds at (`loads/active_stiffness`), the pressures in the cavities, and once fibre and
 sheet. Outputs: stretch per element, displacement, the volumes of the cavities, the apex's uplift, and the twist and
 mean strains of the left ventricle's wall (`wall_motion`).
-Other passive laws are chosen by `material`, quadratic displacements by `element_order`. Source: model.md, Mechanics.
+Other passive laws are chosen by `material`, quadratic displacements by `element_order`. Source: docs/model.md,
+Mechanics.
 
 Loose tolerances are dangerous here: resting tissue fires by itself where λ − 1 > 3.3e-5.
 

@@ -1,7 +1,7 @@
 """Whether a mesh stands in the frame that the units take for granted: mm, base on top at Z = 0, apex below.
 
-The fibre rule, the stimulus box and the ionic time scale are written in that frame (model.md, Geometry), and a heart in
-cm or on its head gives plausible numbers all the same.
+The fibre rule, the stimulus box and the ionic time scale are written in that frame (docs/model.md, Geometry), and a
+heart in cm or on its head gives plausible numbers all the same.
 """
 
 from collections.abc import Iterator

@@ -20,7 +20,7 @@ _KINDS = {0: "points", 1: "lines", 2: "triangles", 3: "tetrahedra"}
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Simplices of one dimension in the undeformed configuration (model.md, Geometry).
+    """Simplices of one dimension in the undeformed configuration (docs/model.md, Geometry).
 
     A scene has as many dimensions as it needs: tetrahedra in space, triangles in the x-y plane, lines along x, or
     single points, which are elements and nodes at once.

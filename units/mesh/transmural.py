@@ -30,7 +30,7 @@ def transmural_direction(mesh: Mesh, endocardium: tuple[str, ...], epicardium: t
     """s₀ = −∇w/|∇w| per element, shape (elements, 3); w is harmonic, 1 on the endocardium, 0 on the epicardium.
 
     A node on both counts as epicardial. Elements without a gradient (all their nodes on one surface) take the mean
-    of their neighbours (model.md, Fibre generator, 1). Raises InvalidInput if some have no neighbour that
+    of their neighbours (docs/model.md, Fibre generator, 1). Raises InvalidInput if some have no neighbour that
     has one.
     """
     w = np.zeros(mesh.nodes)

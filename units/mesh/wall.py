@@ -23,7 +23,7 @@ from .simplices import Mesh
 class Wall:
     """Names of the inner and outer surfaces of the wall, and the surfaces around each cavity.
 
-    The septum's right side counts as outer for fibres, and belongs to the right cavity (model.md, Geometry).
+    The septum's right side counts as outer for fibres, and belongs to the right cavity (docs/model.md, Geometry).
     """
 
     endocardium: tuple[str, ...]

@@ -3,7 +3,7 @@
 Without recovery a cell under the stretch λ rests where c φ (φ − α)(φ − 1) = G_s (λ − 1)(φ_s − φ). The left side has a
 maximum between rest and the threshold α; where the right side is above it everywhere, there is no state of rest, and
 the cell fires. For small α that is G_s (λ − 1) > c α²/(4 φ_s), with the parameters of the heart λ − 1 > 3.3e-5
-(model.md, Numbers). Stretches that are wrong by so much, from an equilibrium that is not solved well enough, start
+(docs/model.md, Numbers). Stretches that are wrong by so much, from an equilibrium that is not solved well enough, start
 beats.
 """
 

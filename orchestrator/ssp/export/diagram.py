@@ -10,13 +10,12 @@ are one connector here. Lengths are in mm, x to the right and y upwards (SSP 2.0
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-
-from ...systems.system import Link, System
+from typing import Protocol
 
 Point = tuple[float, float]
 
 #: Distance of connectors, tracks and lanes; of components in a column and in the margin; width of a letter.
-_PITCH, _GAP, _LETTER = 5.0, 15.0, 2.0
+PITCH, _GAP, _LETTER = 5.0, 15.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -27,6 +26,50 @@ class Box:
     bottom: float
     right: float
     top: float
+
+
+class Named(Protocol):
+    """A component, as far as it is drawn."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+
+class Wired(Protocol):
+    """A link between an output and an input, by the names of their components and their own."""
+
+    @property
+    def source(self) -> str:
+        """The component of the output."""
+
+    @property
+    def output(self) -> str:
+        """The output, or an element of it."""
+
+    @property
+    def target(self) -> str:
+        """The component of the input."""
+
+    @property
+    def input(self) -> str:
+        """The input, or an element of it."""
+
+
+class Drawn(Protocol):
+    """A system, as far as it is drawn; `order` is that of execution, of all components or of some."""
+
+    @property
+    def components(self) -> Sequence[Named]:
+        """What is drawn as rectangles."""
+
+    @property
+    def links(self) -> Sequence[Wired]:
+        """What is drawn as lines."""
+
+    @property
+    def order(self) -> Sequence[str]:
+        """Names of components."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +92,17 @@ class _Wire:
 class Diagram:
     """The drawing of `system`, whose components have connectors for the inputs and outputs `shown` by component.
 
+    Above its connectors a component has room for so many lines of `headings`, those that it has by name.
     `boxes` are the components' rectangles by name, and `canvas` is the rectangle around all.
     """
 
-    def __init__(self, system: System, shown: Mapping[str, tuple[Sequence[str], Sequence[str]]]) -> None:
+    def __init__(
+        self,
+        system: Drawn,
+        shown: Mapping[str, tuple[Sequence[str], Sequence[str]]],
+        headings: Mapping[str, Sequence[str]] | None = None,
+    ) -> None:
+        self._headings = headings or {}
         names = [component.name for component in system.components]
         order = [*system.order, *(name for name in names if name not in system.order)]
         self._pins = {
@@ -73,7 +123,7 @@ class Diagram:
         height = (self._height(component, kind, _field(name)) - box.bottom) / (box.top - box.bottom)
         return (0.0 if kind == "input" else 1.0, round(height, 6))
 
-    def way(self, link: Link) -> tuple[Point, ...]:
+    def way(self, link: Wired) -> tuple[Point, ...]:
         """The points at which the drawing of `link` turns, from its output to its input."""
         wire = _wire(link)
         begin = self._height(wire.net.source, "output", wire.net.output)
@@ -86,11 +136,11 @@ class Diagram:
 
     def _place(self, columns: Sequence[Sequence[str]]) -> None:
         """Place the columns beside each other, and what is in each below each other, all in the middle."""
-        heights = {name: self._rows(name) * _PITCH for column in columns for name in column}
+        heights = {name: self._rows(name) * PITCH for column in columns for name in column}
         totals = [sum(heights[name] for name in column) + _GAP * (len(column) - 1) for column in columns]
         below = sum(1 for backwards in self._lanes.values() if "below" in backwards)
         above = sum(1 for forwards in self._lanes.values() if "above" in forwards)
-        self._bottom = _GAP + below * _PITCH
+        self._bottom = _GAP + below * PITCH
         tallest = max(totals, default=0.0)
         self._top = self._bottom + tallest
         self.boxes: dict[str, Box] = {}
@@ -98,41 +148,45 @@ class Diagram:
         x = _GAP
         for number, (column, total) in enumerate(zip(columns, totals, strict=True)):
             self._left.append(x)
-            x += (len(self._tracks[number]) + 1) * _PITCH
+            x += (len(self._tracks[number]) + 1) * PITCH
             # Whole pitches, so that inputs and outputs keep apart: see `_height`.
-            y = self._top - (tallest - total) // (2.0 * _PITCH) * _PITCH
+            y = self._top - (tallest - total) // (2.0 * PITCH) * PITCH
             width = max(self._width(name) for name in column)
             for name in column:
                 self.boxes[name] = Box(x, y - heights[name], x + width, y)
                 y -= heights[name] + _GAP
             x += width
         self._left.append(x)
-        x += (len(self._tracks[len(columns)]) + 1) * _PITCH
-        self.canvas = Box(0.0, 0.0, x + _GAP, self._top + above * _PITCH + _GAP)
+        x += (len(self._tracks[len(columns)]) + 1) * PITCH
+        self.canvas = Box(0.0, 0.0, x + _GAP, self._top + above * PITCH + _GAP)
 
     def _rows(self, component: str) -> int:
         """Height of a component in pitches: a row for each connector, and one for its name."""
-        return max(len(self._pins[component, kind]) for kind in ("input", "output")) + 2
+        return max(len(self._pins[component, kind]) for kind in ("input", "output")) + 2 + self._lines(component)
+
+    def _lines(self, component: str) -> int:
+        return len(self._headings.get(component, ()))
 
     def _width(self, component: str) -> float:
         longest = sum(max(map(len, self._pins[component, kind]), default=0) for kind in ("input", "output"))
-        letters = max(longest + 4, len(component) + 4, 12)
+        heading = max(map(len, self._headings.get(component, ())), default=0)
+        letters = max(longest + 4, len(component) + 4, heading + 4, 12)
         return letters * _LETTER
 
     def _height(self, component: str, kind: str, field: str) -> float:
         """The y of a connector. Outputs are half a pitch lower than inputs, so that their connections keep apart."""
-        row = self._pins[component, kind].index(field) + (1.5 if kind == "output" else 1.0)
-        return self.boxes[component].top - row * _PITCH
+        row = self._pins[component, kind].index(field) + (1.5 if kind == "output" else 1.0) + self._lines(component)
+        return self.boxes[component].top - row * PITCH
 
     def _x(self, gap: int, track: _Net | _Wire) -> float:
         """The x of a track in the gap to the left of a column."""
-        return self._left[gap] + (self._tracks[gap].index(track) + 1) * _PITCH
+        return self._left[gap] + (self._tracks[gap].index(track) + 1) * PITCH
 
     def _lane(self, wire: _Wire) -> float:
         """The y of a lane above or below all components."""
         side = _side(wire, self._column)
         number = [net for net, sides in self._lanes.items() if side in sides].index(wire.net) + 1
-        return self._top + number * _PITCH if side == "above" else self._bottom - number * _PITCH
+        return self._top + number * PITCH if side == "above" else self._bottom - number * PITCH
 
 
 def _field(name: str) -> str:
@@ -140,7 +194,7 @@ def _field(name: str) -> str:
     return name.partition("[")[0] if name.endswith("]") else name
 
 
-def _wire(link: Link) -> _Wire:
+def _wire(link: Wired) -> _Wire:
     return _Wire(_Net(link.source, _field(link.output)), link.target, _field(link.input))
 
 

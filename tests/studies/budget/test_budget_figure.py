@@ -59,11 +59,11 @@ def test_a_budget_without_any_error_is_drawn_too(tmp_path: Path) -> None:
 
 def test_sentences_say_where_the_error_is_from_and_what_is_not_trusted() -> None:
     assert sentence(_APEX) == (
-        "activation at apex: 107.2 ms ± 8.9, nearly all of it from the mesh; the communication step adds 0.3 "
+        "activation at apex: 107.2 ms ± 8.9, nearly all from the mesh; the communication step adds 0.3 "
         "(not trusted: mesh) (unknown: gone)"
     )
     alone = _quantity(_contribution("mesh", 0.014, True), name="lv_ejection_fraction", value=0.4251)
-    assert sentence(alone) == "lv ejection fraction: 0.425 ± 0.014, all of it from the mesh"
+    assert sentence(alone) == "lv ejection fraction: 0.425 ± 0.014, all from the mesh"
     none = _quantity(_contribution("mesh", 0.0, False, True), name="apex_uplift_max_mm", value=3.0)
     assert sentence(none) == "largest apex uplift: 3 mm ± 0"
 

@@ -48,7 +48,7 @@ def test_each_source_gets_its_own_error(strand: Path, runner: Any) -> None:
     }
     assert all(each.value == pytest.approx(110.5) for each in found.values())
     assert sentences(budget) == [
-        "activation at near: 110 ms ± 12, of which the electrophysiology mesh makes 9, the mechanics mesh 2, "
+        "activation at near: 110 ms ± 12; the electrophysiology mesh contributes 9, the mechanics mesh 2, "
         "the electrophysiology sub-step 0.8 and the communication step 0.3"
     ]
 

@@ -115,7 +115,7 @@ def test_the_axes_say_what_they_are_and_in_which_unit() -> None:
         # The views of a measure are compared by eye.
         assert axes[2 * place].get_ylim() == axes[2 * place + 1].get_ylim()
     beside_others = _one({"held": _sweep({1.0: 0.1, 2.0: 0.2})}, cost=CPU)
-    assert _panels(draw(beside_others))[0].get_xlabel() == "seconds of processor time"
+    assert _panels(draw(beside_others))[0].get_xlabel() == "seconds of CPU time"
 
 
 def test_points_on_the_front_are_full_and_others_hollow() -> None:
@@ -161,7 +161,7 @@ def test_points_without_a_result_stand_outside_with_their_reasons_below() -> Non
 def test_many_reasons_leave_room_for_the_chart_and_say_where_the_others_are() -> None:
     failed = [without_results({_STEP: float(n)}, "failed", f"reason {n}") for n in range(2, 42)]
     figure = draw(_one({"held": [*_sweep({1.0: 0.1}), *failed]}))
-    assert "25 more reasons stand in the table and on the page of this chart." in _words(figure)
+    assert "25 more reasons are in the table and on the page of this chart." in _words(figure)
     for axis in _panels(figure):
         assert len([each for each in axis.lines if each.get_marker() == "x"]) == 40
 

@@ -137,9 +137,9 @@ def test_a_button_changes_words_and_limits_of_every_axis() -> None:
     chart = replace(realistic(), cost=CPU)
     (menu,) = _content(chart)["layout"]["updatemenus"]
     seconds, solves = menu["buttons"]
-    assert seconds["label"] == "seconds of processor time"
+    assert seconds["label"] == "seconds of CPU time"
     for suffix in ("", "2", "3"):
-        assert seconds["args"][1][f"xaxis{suffix}.title.text"] == "seconds of processor time"
+        assert seconds["args"][1][f"xaxis{suffix}.title.text"] == "seconds of CPU time"
         assert solves["args"][1][f"xaxis{suffix}.title.text"] == solves["label"]
         low, high = solves["args"][1][f"xaxis{suffix}.range"]
         costs = [row.solves for row in chart.rows if row.is_done]

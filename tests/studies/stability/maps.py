@@ -220,7 +220,7 @@ def long_keys() -> StabilityMap:
 
 _REASONS = {
     SOUND: "",
-    INACCURATE: "lv_volume_ml errs by 1.2 ml, allowed are 0.5",
+    INACCURATE: "the error in lv_volume_ml is 1.2 ml, the tolerance 0.5",
     OSCILLATING: "mechanics.stretch alternates and grows by 1.31 from step to step",
     DIVERGED: "mechanics: no equilibrium at 105 ms, residual 3.2e-3, after mechanics.stretch grew by 1.9 per step",
     NOT_CONVERGED: "the coupling iteration did not converge at 12 ms within 50 sweeps",

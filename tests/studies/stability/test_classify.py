@@ -58,7 +58,7 @@ def _verdict(
             ["a.b"],
         ),
         (DONE, {"growth": _GROWING}, OSCILLATING, 1.3, ["mechanics.stretch", "grows", "1.3", "period of 2 steps"]),
-        (DONE, _END | {"growth": _RINGING}, OSCILLATING, 0.97, ["rings on", "0.97", "period of 4 steps"]),
+        (DONE, _END | {"growth": _RINGING}, OSCILLATING, 0.97, ["keeps ringing", "0.97", "period of 4 steps"]),
         (DONE, _END | {"growth": _ENDING}, SOUND, 0.97, []),
         (DONE, _END | {"growth": _FADING}, SOUND, 0.97, []),
         (DONE, {"unconverged_ms": [4.0, 5.0], "steps": 20}, NOT_CONVERGED, None, ["2 of 20 steps", "first to 4 ms"]),
@@ -66,7 +66,7 @@ def _verdict(
         (FAILED, {"failure": _UNIT}, UNIT_FAILED, None, ["an element is inverted"]),
         (FAILED, {"failure": _UNIT, "growth": _DECAYING}, UNIT_FAILED, 0.4, ["an element is inverted"]),
         (FAILED, {"failure": _UNIT, "growth": _GROWING}, DIVERGED, 1.3, ["an element is inverted", "grows", "1.3"]),
-        (FAILED, _END | {"failure": _UNIT, "growth": _RINGING}, UNIT_FAILED, 0.97, ["rings on"]),
+        (FAILED, _END | {"failure": _UNIT, "growth": _RINGING}, UNIT_FAILED, 0.97, ["keeps ringing"]),
         (FAILED, {"growth": _GROWING}, DIVERGED, 1.3, ["grows"]),
         (FAILED, {}, UNIT_FAILED, None, ["an element is inverted"]),
         (FAILED, {"failure": {"kind": "coupling"}}, NOT_CONVERGED, None, ["an element is inverted"]),
@@ -129,7 +129,7 @@ def test_without_modes_the_runs_own_measure_counts_and_the_reason_says_why(tmp_p
 
 
 def test_accuracy_counts_where_nothing_worse_is_found(tmp_path: Path) -> None:
-    wrong = Judgement({"a": 2.0}, exceeded="a errs by 2 ml, allowed are 1")
+    wrong = Judgement({"a": 2.0}, exceeded="the error in a is 2 ml, the tolerance 1")
     assert _verdict(tmp_path, DONE, {}, judgement=wrong) == Verdict(INACCURATE, wrong.exceeded)
     assert _verdict(tmp_path, DONE, {"growth": _GROWING}, judgement=wrong).kind == OSCILLATING
     unknown = Judgement(unjudged="not judged for accuracy: its reference failed")

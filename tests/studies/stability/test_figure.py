@@ -263,7 +263,7 @@ def test_axes_say_the_last_part_of_their_key_and_the_caption_all_of_it() -> None
     figure = draw(loop_gain())
     (axis,) = _panels(figure)
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("length dependence", "step (ms)")
-    assert f"{GAIN} to the right and {STEP} upwards" in _words(figure)
+    assert f"x axis {GAIN}, y axis {STEP}" in _words(figure)
     for key, words in {
         "units.electrophysiology.parameters.longest_substep_ms": "longest substep (ms)",
         "units.x.parameters.slow_rate_per_ms": "slow rate (1/ms)",
@@ -287,7 +287,7 @@ def test_the_figure_says_what_theory_tolerances_references_and_machine_are() -> 
     for part in (
         "four_schemes: where runs of heart.yaml are sound",
         "Theory (loop_gain): stable where |g| < 1, g = −K_a/K_p.",
-        "Inaccurate: lv_volume_ml errs by more than 0.5 ml or activation_ms errs by more than 2 ms.",
+        "Inaccurate: an error in lv_volume_ml of more than 0.5 ml or in activation_ms of more than 2 ms.",
         "the reference (the same with coupling.step_ms=0.1)",
         "AMD EPYC 7B13",
         "3 of 168 cells were not run.",
@@ -311,8 +311,8 @@ def test_panels_over_different_keys_say_which_are_theirs() -> None:
     one = _number_panel([1.0], [2.0], name="one")
     other = _number_panel([1.0], [2.0], name="other", x_key="coupling.order")
     text = _sentences(map_of([one, other]))
-    assert f"one: {GAIN} to the right and {STEP} upwards" in text
-    assert f"other: coupling.order to the right and {STEP} upwards" in text
+    assert f"one: x axis {GAIN}, y axis {STEP}" in text
+    assert f"other: x axis coupling.order, y axis {STEP}" in text
 
 
 def test_a_cell_that_is_nowhere_on_the_grid_is_not_passed_over() -> None:

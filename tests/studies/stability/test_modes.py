@@ -118,7 +118,7 @@ def test_what_has_no_modes_says_why() -> None:
         ({"time_ms": time, "a": np.ones(60)}, "nothing in its time series moves"),
         ({"time_ms": time[:4], "a": time[:4] ** 2}, "too short"),
         ({"time_ms": time**2, "a": 0.9**time}, "steps differ"),
-        ({"time_ms": time, "a": np.array(logistic)}, "no linear recurrence"),
+        ({"time_ms": time, "a": np.array(logistic)}, "not a linear recurrence"),
     ):
         modes = fitted_modes(columns)
         assert modes.radius is None

@@ -88,10 +88,10 @@ def test_hovering_over_a_box_tells_all_of_its_run() -> None:
         assert cell.reason in text
         assert f"measured growth: {growth_text(cell.measure)}" in text
         assert f"predicted growth: {growth_text(cell.predicted)}" in text
-        assert f"lv_volume_ml: errs by {cell.errors['lv_volume_ml']:.3g} ml" in text
+        assert f"error in lv_volume_ml: {cell.errors['lv_volume_ml']:.3g} ml" in text
         assert cell.trial is not None
         assert f"wall clock: {cell.trial.wall_s:.3g} s" in text
-    assert "activation_ms: errs by infinite ms" in _plain(_hovered(content, 2.0, 1.0))
+    assert "error in activation_ms: infinite ms" in _plain(_hovered(content, 2.0, 1.0))
 
 
 def test_boxes_have_the_colours_hatching_and_edges_of_the_figure() -> None:
@@ -217,7 +217,7 @@ def test_the_page_says_what_its_axes_are_in_words_and_where_its_numbers_are_from
         "loop_gain: where runs of cell.yaml are sound",
         f"{GAIN}: length dependence",
         f"{STEP}: step (ms)",
-        "lv_volume_ml errs by more than 0.5 ml",
+        "an error in lv_volume_ml of more than 0.5 ml",
         "coupling.step_ms=0.1",
         "AMD EPYC 7B13",
         "numpy 2.3.1",

@@ -109,7 +109,7 @@ def test_of_iterated_coupling_only_a_theory_of_single_units_says_something(
     study.write_text(text.replace("coupling.interpolation: [hold, linear]", iterate))
     found = mapped(study)
     assert [cell.predicted for cell in found.cells] == [0.4, None]
-    assert any("theory says nothing of 1 of 2 cells" in note for note in found.notes)
+    assert any("theory predicts nothing for 1 of 2 cells" in note for note in found.notes)
     monkeypatch.setattr(Asking, "of_exchange", False)
     assert [cell.predicted for cell in mapped(study).cells] == [0.4, 0.4]
 

@@ -82,7 +82,7 @@ _BOUNDARIES = [
         grows=True,
         assignments=["units.second.parameters.k=55", "units.first.parameters.m=1.7"],
     ),
-    Boundary("reaction_step", 12.9, "explicit reaction", INACCURATE, "potential_cell_mV errs by"),
+    Boundary("reaction_step", 12.9, "explicit reaction", INACCURATE, "the error in potential_cell_mV is"),
     Boundary("active_stress_step", 1, "forward Euler", DIVERGED, _GROWS, ["exact"], grows=True),
     Boundary("explicit_diffusion", 1, "explicit, consistent mass", UNIT_FAILED, _LEAVES, ["implicit"]),
 ]
@@ -97,7 +97,7 @@ _LONG = [
         assignments=["units.active_stress.parameters.tension_per_potential_MPa_per_mV=0.004"],
     ),
     Boundary("delay", 0.5, "explicit Jacobi", OSCILLATING, _GROWS, grows=True),
-    Boundary("resting_tissue", 10, "one cell at rest", INACCURATE, "potential_cell_mV errs by"),
+    Boundary("resting_tissue", 10, "one cell at rest", INACCURATE, "the error in potential_cell_mV is"),
     Boundary("explicit_diffusion", 1, "explicit, lumped mass", UNIT_FAILED, _LEAVES),
     # Each look at this theory takes a third of a second: one search for the limit is enough.
     *(
@@ -293,7 +293,7 @@ def test_elements_that_are_long_against_the_front_shift_the_activation(run: Call
     # The lumped mass makes slow what half an element of stimulus has made early.
     assert coarse.pop((lumped, 1)).kind == SOUND
     assert [cell.kind for cell in coarse.values()] == [INACCURATE] * 3
-    assert all("activation_ms errs by" in cell.reason for cell in coarse.values())
+    assert all("the error in activation_ms is" in cell.reason for cell in coarse.values())
 
 
 @pytest.mark.long
@@ -303,7 +303,7 @@ def test_a_loose_equilibrium_moves_the_activation(run: Callable[..., Cells]) -> 
     (loose,) = run("loose_equilibrium", 9e-3, conductance).values()
     assert (tight.kind, loose.kind) == (SOUND, INACCURATE)
     assert tight.errors["activation_ms"] < 1e-3
-    assert "activation_ms errs by" in loose.reason
+    assert "the error in activation_ms is" in loose.reason
 
 
 @pytest.mark.long

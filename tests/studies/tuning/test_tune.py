@@ -81,7 +81,7 @@ def test_a_tolerance_that_nothing_keeps_ends_with_what_comes_nearest(
     ended = cosim("tune", strand, *short, "--tolerance", "activation_ms=1e-9", "--output", out)
     assert ended.code == 3
     assert "none of" in ended.err
-    assert "nearest comes" in ended.err
+    assert "the nearest is" in ended.err
     assert "activation_ms within 1e-09 ms" in ended.err
     assert not (out / "short.tuned.yaml").exists()
     table = pandas.read_csv(out / "tune.csv")

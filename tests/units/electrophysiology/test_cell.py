@@ -25,7 +25,7 @@ each_variant = pytest.mark.parametrize("variant", _VARIANTS)
 
 
 def _equations(_: float, values: np.ndarray) -> list[float]:
-    """The ionic model of model.md, written a second time, with its numbers."""
+    """The ionic model of docs/model.md, written a second time, with its numbers."""
     phi, r = values
     return [
         -8.0 * phi * (phi - 0.01) * (phi - 1.0) - r * phi,
@@ -112,7 +112,7 @@ def test_rates_are_the_printed_equations_at_any_point() -> None:
 
 
 def test_action_potential_is_the_independent_computations() -> None:
-    # Independent computation from φ = 0.7, r = 0 (model.md, Numbers to verify against).
+    # Independent computation from φ = 0.7, r = 0 (docs/model.md, Numbers to verify against).
     times = np.linspace(0.0, 60.0, 3001)
     phi, recovery = _course(_CELL, 0.7, times)
     assert _duration_90(times, phi) == pytest.approx(31.26, abs=0.01)
@@ -152,7 +152,7 @@ def test_threshold_of_excitation_from_both_sides(alpha: float) -> None:
 
 @each_variant
 def test_homogeneous_tissue_has_the_action_potential_of_the_cell(variant: str, tissue) -> None:
-    # Independent computation (model.md, Numbers to verify against); at the unit's default substep.
+    # Independent computation (docs/model.md, Numbers to verify against); at the unit's default substep.
     times, (phi, recovery) = _tissue_course(tissue(variant), 1.0, 45.0)
     assert _duration_90(times, phi) == pytest.approx(31.26, abs=0.01)
     assert 100.0 * phi.max() - 80.0 == pytest.approx(19.95, abs=0.005)

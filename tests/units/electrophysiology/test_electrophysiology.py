@@ -378,7 +378,7 @@ def _firing_stretch() -> float:
 
 @each_variant
 def test_resting_tissue_fires_by_itself_just_above_the_balance_and_not_below(variant: str, box, started, along) -> None:
-    # Independent computation (model.md, Numbers to verify against): λ − 1 > 3.3e-5 with r = 0.
+    # Independent computation (docs/model.md, Numbers to verify against): λ − 1 > 3.3e-5 with r = 0.
     firing = _firing_stretch()
     assert firing == pytest.approx(3.3e-5, abs=0.1e-5)
     grain = box([0.0, 1.0], [0.0, 1.0], [-1.0, 0.0])

@@ -31,7 +31,7 @@ _VARIANTS = {
 each_variant = pytest.mark.parametrize("variant", _VARIANTS)
 
 #: Relative speed errors in per cent on a uniform 1-D grid at h = 1, 2, 3, 5 mm, by an independent computation
-#: (model.md, Numbers to verify against), which gives them to 0.1 %.
+#: (docs/model.md, Numbers to verify against), which gives them to 0.1 %.
 _GRID_ERRORS = {
     "lumped": {1.0: -0.4, 2.0: -1.2, 3.0: -2.3, 5.0: -4.7},
     "nodal": {1.0: 0.2, 2.0: 1.0, 3.0: 2.4, 5.0: 5.3},
@@ -178,7 +178,7 @@ def strand_speed(strand):
 
 
 def test_closed_form_is_the_figure() -> None:
-    # Independent computation (model.md, Numbers to verify against): 0.5457 across the fibre, 0.5723 along.
+    # Independent computation (docs/model.md, Numbers to verify against): 0.5457 across the fibre, 0.5723 along.
     assert pytest.approx(0.5457, abs=5e-5) == _ACROSS
     assert pytest.approx(0.5723, abs=5e-5) == _ALONG
 
@@ -270,7 +270,7 @@ def test_fibre_along_the_strand_speeds_the_wave_up(variant: str, strand_speed) -
 
 
 def test_full_model_runs_slightly_slower(strand_speed) -> None:
-    # Independent computation (model.md, Numbers to verify against): 0.5452 and 0.5717. The errors of the two mass
+    # Independent computation (docs/model.md, Numbers to verify against): 0.5452 and 0.5717. The errors of the two mass
     # matrices, currents at the nodes, are opposite and of second order: what remains of their mean at h = 1 mm is
     # below 0.02 %.
     for axis, figure in ((1, 0.5452), (0, 0.5717)):
@@ -281,7 +281,7 @@ def test_full_model_runs_slightly_slower(strand_speed) -> None:
 
 @each_variant
 def test_front_is_as_wide_as_the_closed_form(variant: str, strand) -> None:
-    # Independent computation (model.md, Numbers to verify against): 10-90 % front of about 7.9 mm.
+    # Independent computation (docs/model.md, Numbers to verify against): 10-90 % front of about 7.9 mm.
     exact = 2.0 * log(9.0) * sqrt(2.0 * _SCALE_MS / 8.0)
     assert exact == pytest.approx(7.9, abs=0.05)
     unit = strand(1.0, variant, 1, beat=0.6)

@@ -176,8 +176,8 @@ def test_rigid_motion_costs_nothing(cube) -> None:
 
 # --- free contraction of a homogeneous cube ------------------------------------------------------------------------
 
-#: s_a in MPa: stretch along and across the fibre, and J, by an independent computation (model.md, Numbers to verify
-#: against).
+#: s_a in MPa: stretch along and across the fibre, and J, by an independent computation (docs/model.md, Numbers to
+#: verify against).
 _CONTRACTION = {0.5: (0.73626, 0.97398, 0.698), 0.1: (0.90157, 1.00799, 0.91604)}
 
 

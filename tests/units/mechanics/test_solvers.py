@@ -25,7 +25,7 @@ from cardiac_cosim.units.mesh import Mesh
 #: Linear solvers, and what they leave of a residual.
 _SOLVERS = {"superlu": 1e-12, "multigrid": 1.1e-2} | ({"supernodal": 1e-4} if find_spec("rslab") else {})
 
-#: Stretch beyond 1 at which resting tissue fires by itself (model.md, Numbers to verify against).
+#: Stretch beyond 1 at which resting tissue fires by itself (docs/model.md, Numbers to verify against).
 _FALSE_BEAT = 3.3e-5
 
 

@@ -15,7 +15,7 @@ def _coupled(setting: Callable[..., Setting], offset: float, **parameters: Any) 
 
 
 def test_the_hearts_tissue_fires_beyond_a_stretch_of_3e_5(setting: Callable[..., Setting]) -> None:
-    # model.md, Numbers to verify against: λ − 1 > 3.3e-5.
+    # docs/model.md, Numbers to verify against: λ − 1 > 3.3e-5.
     assert 1.0 / RestingTissue().amplification(_coupled(setting, 1.0)) == pytest.approx(3.3e-5, rel=0.02)
 
 

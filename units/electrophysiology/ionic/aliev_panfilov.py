@@ -1,6 +1,6 @@
 """The Aliev–Panfilov ionic model: two dimensionless variables per point.
 
-With φ = (Φ − Φ_rest)/β_φ and τ = t/β_t (model.md, Electrophysiology; Göktepe & Kuhl 2010; Nash & Panfilov 2004):
+With φ = (Φ − Φ_rest)/β_φ and τ = t/β_t (docs/model.md, Electrophysiology; Göktepe & Kuhl 2010; Nash & Panfilov 2004):
 
     ∂φ/∂τ = −Ĩ_e,  Ĩ_e = cφ(φ − α)(φ − 1) + rφ
     ∂r/∂τ = (γ + μ₁ r/(μ₂ + φ)) (−r − cφ(φ − b − 1))

@@ -1,4 +1,4 @@
-"""The fibre part of the strain energy, in tension only (Holzapfel–Gasser–Ogden; model.md, Mechanics).
+"""The fibre part of the strain energy, in tension only (Holzapfel–Gasser–Ogden; docs/model.md, Mechanics).
 
     W_f = k₁/(2k₂) (exp(k₂ (Ī_a − 1)²) − 1) for Ī_a > 1, else 0,   Ī_a = J^(−2/3) a₀·C a₀
 

@@ -1,4 +1,4 @@
-"""The isotropic part of the strain energy: a compressible neo-Hookean solid (model.md, Mechanics).
+"""The isotropic part of the strain energy: a compressible neo-Hookean solid (docs/model.md, Mechanics).
 
     W = ½μ(I₁ − 3) ∓ μ ln J + ½λ_L (ln J)²
 

@@ -1,7 +1,7 @@
 """The active stress: a second Piola–Kirchhoff stress, fixed while the solid deforms.
 
 It has the potential ½ s_a (a₀·C a₀ + 0.4 s₀·C s₀ + 0.4 n₀·C n₀), so that equilibrium is the minimum of an energy.
-Source: model.md, Mechanics; Bakir et al. 2018.
+Source: docs/model.md, Mechanics; Bakir et al. 2018.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Writes docs/units.md, the tables of every unit's variables, from the units' own declarations."""
+"""The page docs/units.md: tables of every unit's variables, from the units' own declarations."""
 
 from pathlib import Path
 
@@ -35,15 +35,15 @@ _DERIVATIVES = (
     "and only if derivatives are requested."
 )
 
-PAGE = Path(__file__).parent / "units.md"
+PAGE = Path(__file__).parents[1] / "units.md"
 
 
 def page() -> str:
-    """The text of docs/units.md."""
+    """Its text."""
     purpose = (
         "This page lists all units with their inputs, outputs and parameters. It is a reference for people who write a "
         "scenario, connect an FMU, or look up the default or the range of a parameter. It is written by "
-        "`python docs/unit_tables.py` from the declarations in `units/`."
+        "`python docs/generate` from the declarations in `units/`."
     )
     own = " and ".join(f"`{item.name}` ({item.description})" for item in (IMPLEMENTATION, FALLBACKS))
     both = (
@@ -88,7 +88,3 @@ def _accuracy(variable: Variable) -> str:
     if variable.refines is None:
         return ""
     return f" (**accuracy**, {variable.refines.value}: {_REFINED_BY[variable.refines]} makes the error smaller)"
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")

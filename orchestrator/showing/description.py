@@ -5,17 +5,17 @@ from math import ceil
 
 import numpy as np
 
-from .assembly import Assembly
-from .coupling.build import idle
-from .coupling.connections import Connection
-from .coupling.loops import groups_in_order
-from .coupling.master import stepping_order
-from .participants.driven import Driven
-from .participants.native import Mesh, element_quality
-from .participants.participant import Participant, Port
-from .scenario import Scenario
+from ..assembly import Assembly
+from ..coupling.build import idle
+from ..coupling.connections import Connection
+from ..coupling.loops import groups_in_order
+from ..coupling.master import stepping_order
+from ..participants.driven import Driven
+from ..participants.native import Mesh, element_quality
+from ..participants.participant import Participant, Port
+from ..scenario import Scenario
 
-#: 10–90 % width of a depolarising front in mm (model.md, Numbers); an element longer than half of it is too coarse.
+#: 10–90 % width of a depolarising front in mm (docs/model.md, Numbers); elements longer than half of it are too coarse.
 _FRONT_MM = 7.9
 #: How long an upstroke takes in ms on the way from rest to its peak.
 _UPSTROKE_MS = 15.0
