@@ -2,16 +2,18 @@
 
 import os
 import signal
+import sys
 from contextlib import suppress
 from types import TracebackType
 
 import dask
 from distributed import Client, LocalCluster
+from distributed.utils import get_mp_context
 
 from .errors import InputError
 
-#: How long Dask may take to close, in seconds.
-_CLOSING_S = 5.0
+#: How long a scheduler may take to answer, and Dask to close, in seconds.
+_ANSWER_S, _CLOSING_S = 10.0, 5.0
 
 #: A worker that dies costs what it was doing, which is not tried again; one that works for long has not died. Nobody
 #: looks at what its threads do every 10 ms: that takes the interpreter away from what is timed.
@@ -19,7 +21,13 @@ _SETTINGS = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.worker-ttl": None,
     "distributed.worker.profile.enabled": False,
+    # Worker processes are forked from one process that has imported what they need, which takes seconds, once for all.
+    # Elsewhere than on Linux a process that has loaded the system's libraries cannot be relied on to fork.
+    "distributed.worker.multiprocessing-method": "forkserver" if sys.platform == "linux" else "spawn",
 }
+
+#: What that process imports: Dask, and all that a run needs.
+_PRELOADED = ["distributed", f"{__package__}.run"]
 
 
 class Cluster:
@@ -34,6 +42,9 @@ class Cluster:
         try:
             if self.is_ours:
                 with dask.config.set(_SETTINGS):
+                    # After Dask has set what it preloads itself, which is less.
+                    if (context := get_mp_context()).get_start_method() == "forkserver":
+                        context.set_forkserver_preload(_PRELOADED)
                     self._own = LocalCluster(
                         n_workers=count,
                         threads_per_worker=1,
@@ -42,7 +53,7 @@ class Cluster:
                         silence_logs=50,
                         memory_limit=0,
                     )
-            self.client = Client(self._own or where, timeout=10.0)
+            self.client = Client(self._own or where, timeout=_ANSWER_S)
             self.workers = sorted(self.client.scheduler_info(n_workers=-1)["workers"])
         except OSError as error:
             raise InputError(f"{key}: no Dask scheduler answers at {where} ({error})") from None
@@ -69,7 +80,8 @@ class Cluster:
         if self._own is not None and self._where == "processes":
             # Dask would wait for work that hangs. Nothing is lost: whoever leaves here has what the workers did.
             for nanny in self._own.workers.values():
-                nanny.auto_restart = False
+                # Otherwise a worker that is gone is started again, and closing waits seconds for it.
+                nanny.close_gracefully("the work is done")
                 with suppress(ProcessLookupError, TypeError):
                     os.kill(nanny.pid, signal.SIGKILL)
         # A scheduler that does not come to an end in time, on a busy machine, is not to hide how the work ended.

@@ -599,24 +599,20 @@ def _may_be_read_by_all(path: Path) -> bool:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-@pytest.mark.parametrize("state", ["complete", "interrupted"])
 @pytest.mark.skipif(
     not (_may_be_read_by_all(Path(sys.prefix)) and _may_be_read_by_all(Path(__file__).parent)),
     reason="nobody else may read this project where it lies",
 )
 def test_a_folder_that_another_user_may_only_read_is_refused(
-    small_scenario: Path, tmp_path: Path, state: str, monkeypatch: pytest.MonkeyPatch
+    small_scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    if state == "complete":
-        _run(small_scenario, out)
-    elif state == "interrupted":
-        _interrupted(small_scenario, out, monkeypatch)
+    complete, interrupted = tmp_path / "complete", tmp_path / "interrupted"
+    _run(small_scenario, complete)
+    _interrupted(small_scenario, interrupted, monkeypatch)
     for folder in (tmp_path, *tmp_path.parents):
         if folder.is_relative_to("/tmp") and folder != Path("/tmp"):
             folder.chmod(0o755)
-    before = _bytes(out)
+    before = _bytes(complete), _bytes(interrupted)
     # Whoever this is may not read where Python lies; all that is needed is imported before.
     code = f"""
 import os, sys
@@ -625,19 +621,23 @@ from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 from cardiac_cosim.report.presentation import Presentation
 from cardiac_cosim.orchestrator.errors import InputError
-path, out = Path({str(small_scenario)!r}), Path({str(out)!r})
+path, folders = Path({str(small_scenario)!r}), (Path({str(complete)!r}), Path({str(interrupted)!r}))
 scenario = load_scenario(path, {list(_SETS)!r})
 os.setgroups([]), os.setgid(65534), os.setuid(65534)
-for resume in (False, True):
-    try:
-        run_scenario(scenario, path.parent, out, resume=resume)
-    except InputError as error:
-        print(error)
+for out in folders:
+    for resume in (False, True):
+        try:
+            run_scenario(scenario, path.parent, out, resume=resume)
+        except InputError as error:
+            print(error)
 """
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    told = f"the folder {out} cannot be written (Permission denied); choose another with --output\n"
-    assert ended.stdout == 2 * told
-    assert _bytes(out) == before
+    told = [
+        2 * f"the folder {out} cannot be written (Permission denied); choose another with --output\n"
+        for out in (complete, interrupted)
+    ]
+    assert ended.stdout == "".join(told)
+    assert (_bytes(complete), _bytes(interrupted)) == before
 
 
 def test_figures_that_cannot_be_written_are_a_warning(

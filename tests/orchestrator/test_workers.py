@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cardiac_cosim.orchestrator.cluster import Cluster
 from cardiac_cosim.orchestrator.errors import InputError, ParticipantLost, RunError
 from cardiac_cosim.orchestrator.participants.participant import Participant
 from cardiac_cosim.orchestrator.participants.recipe import Recipe
@@ -21,6 +22,7 @@ from cardiac_cosim.orchestrator.results.recording import Recording
 from cardiac_cosim.orchestrator.run import run_scenario
 from cardiac_cosim.orchestrator.scenario import load_scenario
 from cardiac_cosim.units.mesh import Mesh
+from distributed import Nanny
 from threadpoolctl import threadpool_info, threadpool_limits
 
 
@@ -86,7 +88,10 @@ def test_units_work_under_a_scheduler_elsewhere(scheduler: str, small_scenario: 
     assert _series(small_scenario, tmp_path / "workers", *common, f"run.workers={scheduler}") == alone
 
 
-def test_a_scheduler_that_does_not_answer_is_the_persons_to_mend(small_scenario: Path, tmp_path: Path) -> None:
+def test_a_scheduler_that_does_not_answer_is_the_persons_to_mend(
+    small_scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cardiac_cosim.orchestrator.cluster._ANSWER_S", 1.0)
     with pytest.raises(InputError, match=r"run\.workers: no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         _series(small_scenario, tmp_path / "out", "run.workers=tcp://127.0.0.1:9")
 
@@ -157,6 +162,26 @@ def test_a_unit_that_dies_takes_only_its_process_along(asleep: type[Recipe]) -> 
         with pytest.raises(ParticipantLost, match="its process ended unexpectedly"):
             wait()
         other.start(0.0, 1.0)()
+
+
+def test_workers_whose_work_is_done_are_not_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    started = []
+
+    async def start(nanny: Nanny) -> None:
+        started.append(nanny)
+
+    with Cluster("processes", 1, "run.workers") as cluster:
+        assert cluster.client.submit(os.getpid).result(timeout=60) != os.getpid()
+        monkeypatch.setattr(Nanny, "instantiate", start)
+        close = cluster.client.close
+
+        def slowly(**options: Any) -> None:
+            # As on a busy machine: Dask learns that the worker is gone before it is told to come to an end.
+            time.sleep(0.5)
+            close(**options)
+
+        monkeypatch.setattr(cluster.client, "close", slowly)
+    assert not started
 
 
 def test_when_a_worker_is_killed_the_results_so_far_are_readable_and_the_run_can_go_on(

@@ -1,6 +1,7 @@
 """Studies of one cell: points of a tenth of a second."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,39 @@ lines:
     set: {coupling.interpolation: linear, coupling.extrapolation: 1}
     vary: {coupling.step_ms: [1, 2, 4]}
 """
+
+
+@pytest.fixture(autouse=True)
+def _timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short runs are not repeated: few tests look at what runs cost."""
+    monkeypatch.setattr("cardiac_cosim.studies.bench._REPEATS_S", 0.0)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """`study` of `STUDY`, charted into `output`; short runs were repeated, as they are for a person."""
+
+    study: Path
+    output: Path
+    chart: Chart
+
+    def again(self, text: str) -> Chart:
+        """The chart of a study of this text in the place of the other one: points that both have are not run again."""
+        path = self.study.with_name("again.yaml")
+        path.write_text(text)
+        with Bench(self.output) as bench:
+            return chart_study(plan_study(path), bench)
+
+
+@pytest.fixture(scope="session")
+def steps(tmp_path_factory: pytest.TempPathFactory) -> Steps:
+    """One for all tests that read what such a study leaves."""
+    folder = tmp_path_factory.mktemp("steps")
+    (folder / "small_cell.yaml").write_text(_SCENARIO)
+    study = folder / "steps.yaml"
+    study.write_text(STUDY)
+    with Bench(folder / "out") as bench:
+        return Steps(study, folder / "out", chart_study(plan_study(study), bench))
 
 
 @pytest.fixture

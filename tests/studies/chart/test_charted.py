@@ -62,10 +62,10 @@ def test_the_step_is_the_one_number_that_varies() -> None:
     assert step_of({}) is None
 
 
-def test_every_point_has_its_errors_costs_and_counts(study: Path, tmp_path: Path, charted: Callable[..., Any]) -> None:
-    chart = charted(study)
-    write_chart(chart, tmp_path / "out")
-    table = pandas.read_csv(tmp_path / "out" / "chart.csv")
+def test_every_point_has_its_errors_costs_and_counts(steps: Any, tmp_path: Path) -> None:
+    chart = steps.chart
+    write_chart(chart, tmp_path)
+    table = pandas.read_csv(tmp_path / "chart.csv")
     assert list(table["line"]) == ["held"] * 4 + ["linear"] * 3
     assert list(table["coupling.step_ms"]) == [0.5, 1, 2, 4, 1, 2, 4]
     assert set(table["status"]) == {"done"}
@@ -78,10 +78,10 @@ def test_every_point_has_its_errors_costs_and_counts(study: Path, tmp_path: Path
     assert (table["cpu_s"] >= table[[f"cpu_s_{unit}" for unit in units]].sum(axis=1)).all()
     assert (table["wall_s"] > 0.0).all()
     # The errors are those of the results that lie there, and fall with the step.
-    reference = simulate(tmp_path / "small_cell.yaml", {"coupling.step_ms": 0.25}, tmp_path / "reference")
+    reference = simulate(steps.study.with_name("small_cell.yaml"), {"coupling.step_ms": 0.25}, tmp_path / "reference")
     last = reference.frame("stretch", -1)
     for folder, error in zip(table["folder"], table["error_stretch"], strict=True):
-        run = StoredRun(tmp_path / "out" / "points" / folder)
+        run = StoredRun(steps.output / "points" / folder)
         apart = [abs(run.frame("stretch", number) - reference.frame("stretch", number)).max() for number in range(3)]
         assert error == pytest.approx(max(apart))
     assert last is not None
@@ -90,26 +90,21 @@ def test_every_point_has_its_errors_costs_and_counts(study: Path, tmp_path: Path
     assert chart.lines[0].orders["active_stress_kPa"] == pytest.approx(1.0, abs=0.4)
 
 
-def test_the_front_in_the_table_is_that_of_its_numbers(
-    study: Path, tmp_path: Path, charted: Callable[..., Any]
-) -> None:
-    write_chart(charted(study), tmp_path / "out")
-    table = pandas.read_csv(tmp_path / "out" / "chart.csv")
+def test_the_front_in_the_table_is_that_of_its_numbers(steps: Any, tmp_path: Path) -> None:
+    write_chart(steps.chart, tmp_path)
+    table = pandas.read_csv(tmp_path / "chart.csv")
     for measure in ("stretch", "active_stress_kPa"):
         assert list(table[f"front_{measure}"]) == on_front(list(table["wall_s"]), list(table[f"error_{measure}"]))
 
 
-def test_two_references_tell_how_far_they_are_to_be_trusted(
-    study: Path, tmp_path: Path, charted: Callable[..., Any]
-) -> None:
-    simulate(tmp_path / "small_cell.yaml", {"coupling.step_ms": 0.25}, tmp_path / "kept")
-    text = study.read_text()
-    study.write_text(text.replace("{coupling.step_ms: 0.25}", "[{results: kept}, {coupling.step_ms: 0.5}]"))
-    chart = charted(study)
-    write_chart(chart, tmp_path / "out")
+def test_two_references_tell_how_far_they_are_to_be_trusted(steps: Any, tmp_path: Path) -> None:
+    simulate(steps.study.with_name("small_cell.yaml"), {"coupling.step_ms": 0.25}, tmp_path / "kept")
+    references = f"[{{results: {tmp_path / 'kept'}}}, {{coupling.step_ms: 0.5}}]"
+    chart = steps.again(steps.study.read_text().replace("{coupling.step_ms: 0.25}", references))
+    write_chart(chart, tmp_path)
     # The second one is the first point of the first line.
     assert chart.uncertainty == chart.lines[0].rows[0].errors
-    told = json.loads((tmp_path / "out" / "chart.json").read_text())
+    told = json.loads((tmp_path / "chart.json").read_text())
     assert told["uncertainty"] == chart.uncertainty
     assert [text.partition(":")[0] for text in told["reference"]] == ["results", "coupling.step_ms=0.5"]
     assert {"processor", "cores"} <= told["machine"].keys()
@@ -129,23 +124,20 @@ def test_two_references_tell_how_far_they_are_to_be_trusted(
         ),
     ],
 )
-def test_a_reference_or_a_measure_that_is_none_is_told(
-    before: str, after: str, words: list[str], study: Path, charted: Callable[..., Any]
-) -> None:
-    text = study.read_text()
+def test_a_reference_or_a_measure_that_is_none_is_told(before: str, after: str, words: list[str], steps: Any) -> None:
+    text = steps.study.read_text()
     assert before in text
-    study.write_text(text.replace(before, after))
     with pytest.raises(InputError) as problem:
-        charted(study)
+        steps.again(text.replace(before, after))
     message = str(problem.value)
-    assert message.startswith(f"{study}: ")
+    assert message.startswith(f"{steps.study.with_name('again.yaml')}: ")
     for word in words:
         assert word in message
 
 
-def test_without_measures_all_that_moves_is_measured(study: Path, charted: Callable[..., Any]) -> None:
-    study.write_text(study.read_text().replace("measures: [stretch, active_stress_kPa]\n", ""))
-    names = [measure.name for measure in charted(study).measures]
+def test_without_measures_all_that_moves_is_measured(steps: Any) -> None:
+    chart = steps.again(steps.study.read_text().replace("measures: [stretch, active_stress_kPa]\n", ""))
+    names = [measure.name for measure in chart.measures]
     assert names == [
         "activation_ms",
         "potential_cell_mV",

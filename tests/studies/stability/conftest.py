@@ -40,12 +40,6 @@ lines:
 """
 
 
-@pytest.fixture(autouse=True)
-def _timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What runs cost is not looked at here."""
-    monkeypatch.setattr("cardiac_cosim.studies.bench._REPEATS_S", 0.0)
-
-
 class Masses(Theory):
     """The tests' own theory of the oscillator."""
 

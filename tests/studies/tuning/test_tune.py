@@ -77,7 +77,8 @@ def test_a_tolerance_that_nothing_keeps_ends_with_what_comes_nearest(
     out.mkdir()
     # What an earlier search has found is not to be taken for the answer.
     (out / "short.tuned.yaml").write_text("old")
-    ended = cosim("tune", strand, "--tolerance", "activation_ms=1e-9", "--output", out)
+    short = ("--set", "run.stop_ms=15")
+    ended = cosim("tune", strand, *short, "--tolerance", "activation_ms=1e-9", "--output", out)
     assert ended.code == 3
     assert "none of" in ended.err
     assert "the nearest is" in ended.err
