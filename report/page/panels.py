@@ -70,9 +70,13 @@ class Panel:
 
 
 def figure(panels: Sequence[Panel], end_ms: float) -> dict[str, Any] | None:
-    """Data and layout for Plotly; None without panels."""
+    """Data and layout for Plotly; None without panels.
+
+    All panels reach from the start to `end_ms`, or as far as any curve: sweeps of a step that failed lie beyond the end.
+    """
     if not panels:
         return None
+    end_ms = max([end_ms, *(float(curve.time_ms.max(initial=0.0)) for panel in panels for curve in panel.curves)])
     titles = [_title(panel) for panel in panels]
     heads = [_LINE * len(lines) + _BELOW_TITLE for lines in titles]
     height = sum(heads) + len(panels) * (_PANEL + _GAP) + _AXIS

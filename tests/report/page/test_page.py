@@ -1,5 +1,6 @@
 """If these fail, the page leaves out what a person has to know of a run, or is too large to pass on."""
 
+import base64
 import csv
 import json
 import shutil
@@ -19,6 +20,7 @@ from cardiac_cosim.report.page.document import page
 from cardiac_cosim.report.page.headline_table import headline_table
 from cardiac_cosim.report.page.heart import heart
 from cardiac_cosim.report.page.packed import Packed
+from cardiac_cosim.report.page.panels import figure
 from cardiac_cosim.report.page.run_curves import run_curves
 from cardiac_cosim.units.mesh.file import read_mesh
 from report_kinds import RunOf
@@ -158,3 +160,14 @@ def _cosim(*arguments: str) -> int:
         except SystemExit as end:
             return int(end.code or 0)
     return 0
+
+
+def test_the_sweeps_of_a_step_that_failed_are_within_the_panel(tmp_path: Path) -> None:
+    # They belong to a step beyond the last one that was accepted.
+    (tmp_path / "timeseries.csv").write_text("time_ms,x\n0,1\n")
+    (tmp_path / "iterations.csv").write_text("time_ms,iteration,residual_m.x,contraction_rate\n5,1,0.2,\n5,2,0.1,0.5\n")
+    drawn = figure(coupling_curves(StoredRun(tmp_path)), 0.0)
+    assert drawn is not None
+    assert drawn["layout"]["xaxis"]["range"] == [0.0, 5.0]
+    places = np.frombuffer(base64.b64decode(drawn["data"][0]["x"]["bdata"]))
+    np.testing.assert_array_equal(places, [0.0, 2.5, 5.0])
