@@ -10,7 +10,6 @@ from ..orchestrator.errors import InputError, RunError
 from ..orchestrator.supervision import watch
 from . import (
     comparison_commands,
-    movie_command,
     report_commands,
     scenario_commands,
     schema_command,
@@ -44,7 +43,7 @@ for command in (
     comparison_commands.sweep,
     comparison_commands.compare,
     report_commands.report,
-    movie_command.movie,
+    report_commands.movie,
     verify_command.verify,
     schema_command.schema,
 ):

@@ -72,7 +72,7 @@ class Panel:
 def figure(panels: Sequence[Panel], end_ms: float) -> dict[str, Any] | None:
     """Data and layout for Plotly; None without panels.
 
-    All panels reach from the start to `end_ms`, or as far as any curve: sweeps of a step that failed lie beyond the end.
+    All panels reach from the start to `end_ms`, or as far as any curve: sweeps of a step that failed lie beyond it.
     """
     if not panels:
         return None

@@ -46,6 +46,22 @@ def test_page_and_figures_are_made_again(
     assert not (out / ".lock").exists()
 
 
+def test_figures_show_the_times_that_are_asked_for_and_refuse_others(
+    run_of: RunOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(run_of("heart").folder, out)
+    picture = out / "figures" / "potential_snapshots.png"
+    assert _cosim(monkeypatch, "report", out) == 0
+    chosen = picture.read_bytes()
+    assert _cosim(monkeypatch, "report", out, "--times", "0") == 0
+    assert picture.read_bytes() != chosen
+    capsys.readouterr()
+    for times, told in (("0,5000", "5000 ms"), ("early", "separated by commas")):
+        assert _cosim(monkeypatch, "report", out, "--times", times) == 2
+        assert told in capsys.readouterr().err
+
+
 def test_a_folder_without_results_is_refused_and_stays_as_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
