@@ -11,6 +11,7 @@ from ..orchestrator.supervision import watch
 from . import (
     comparison_commands,
     movie_command,
+    report_commands,
     scenario_commands,
     schema_command,
     study_commands,
@@ -42,6 +43,7 @@ for command in (
     study_commands.tune,
     comparison_commands.sweep,
     comparison_commands.compare,
+    report_commands.report,
     movie_command.movie,
     verify_command.verify,
     schema_command.schema,

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from ..orchestrator.errors import InputError, Interrupted
+from ..orchestrator.results.names import PAGE
 from ..orchestrator.scenario import Scenario, parsed_assignments
 from .exit_codes import INTERRUPTED
 from .manner import Manner, Quiet, Verbose
@@ -55,7 +56,7 @@ def run(
     # Imported here, so that help and errors in the scenario do not wait for numerical and FMI libraries.
     from ..orchestrator.results.request import Request
     from ..orchestrator.run import run_scenario
-    from ..report.presentation import FIGURES, PAGE, Presentation
+    from ..report import presentation
 
     manner = Manner(quiet, verbose)
     overrides = [*(assignments or []), *([f"run.participants={participants}"] if participants else [])]
@@ -64,8 +65,9 @@ def run(
         with about(file):
             try:
                 request = Request(str(file), parsed_assignments(overrides))
-                parts = tuple(part for part, wanted in ((FIGURES, figures), (PAGE, report)) if wanted)
-                shown = Presentation(folder, scenario.name, request.settings, parts) if parts else None
+                wanted = {presentation.FIGURES: figures, presentation.PAGE: report}
+                parts = tuple(part for part in wanted if wanted[part])
+                shown = presentation.Presentation(folder, scenario.name, request.settings, parts) if parts else None
                 outcome = run_scenario(
                     scenario, base, folder, manner.console, fmu_dir, resume, shown, request, progress=not quiet
                 )
@@ -185,6 +187,8 @@ def _report(scenario: Scenario, folder: Path, summary: dict[str, Any], manner: M
         then = f"{volume['min']:.2f} ml, ejection fraction {fraction:.2f}" if ejects else f"{volume['max']:.2f} ml"
         lines.append(f"  {chamber} volume: {volume['start']:.2f} -> {then}")
     lines.append(f"  results in {folder}")
+    if (folder / PAGE).is_file():
+        lines.append(f"  to look at them, open {folder / PAGE} in a browser")
     manner.say("\n".join(lines))
     late, missed = summary["unconverged_ms"], summary["tolerance_missed"]
     if late:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..orchestrator.errors import InputError, Interrupted, RunError
+from ..orchestrator.results.names import PAGE
 from .completion import STUDIES, files_ending
 from .exit_codes import INTERRUPTED
 from .manner import Manner, Quiet, Verbose
@@ -202,6 +203,11 @@ def append_budget(file: Path, variants: "Variants", folder: Path, manner: Manner
     from ..orchestrator.results.stored_run import StoredRun
 
     _budget(file, variants, folder, manner, known=StoredRun(folder))
+    if (folder / PAGE).exists():
+        # Its headline numbers have errors now.
+        from ..report.page import write_page
+
+        write_page(folder)
 
 
 def _budget(

@@ -1,4 +1,4 @@
-"""What FMI has no place for, as annotations: where a field sits, what of it is recorded, whether a unit has memory.
+"""Annotations for what FMI cannot express: where a field sits, what of it is recorded, whether a unit has memory.
 
 The element `Unit` stands under VendorAnnotations in FMI 2.0 (FMI 2.0.4, section 2.2.6) and under Annotations in FMI 3.0
 (FMI 3.0, section 2.4), each time in an element that is named TOOL.

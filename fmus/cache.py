@@ -32,7 +32,7 @@ def cached_fmu(unit: type[Unit], mesh: Mesh, folder: Path | None = None, fmi: in
     """
     root = folder if folder is not None else user_cache() / "fmus"
     if fmi not in (2, 3):
-        raise ValueError(f"there are FMUs of FMI 2 and 3, not {fmi}")
+        raise ValueError(f"FMUs can be built for FMI 2 and 3, not for {fmi}")
     key = fingerprint(unit, mesh, fmi)
     path = root / key[:16] / f"{unit.name}.fmu"
     if _holds(path, guid_of(key)):

@@ -1,4 +1,4 @@
-"""The time that an instance has come to, and which steps it may take from there."""
+"""The time that an instance has reached, and which steps it may take from there."""
 
 from dataclasses import dataclass
 from math import inf, isfinite, isnan
@@ -30,12 +30,14 @@ class Clock:
         a gap or passes the stop time.
         """
         if not (isfinite(time) and isfinite(size) and size > 0.0):
-            raise InvalidInput(f"there is no step from {time} s by {size} s: both have to be finite, its size above 0")
+            raise InvalidInput(
+                f"a step from {time} s by {size} s is not possible: both have to be finite, the size above 0"
+            )
         allowed = _ROUNDING * size
         if abs(time - self.time) > allowed:
             raise InvalidInput(
-                f"a step cannot begin at {time:.12g} s: the instance has come to {self.time:.12g} s; to repeat a step, "
-                "go back to a saved state first"
+                f"a step cannot begin at {time:.12g} s: the instance is at {self.time:.12g} s; to repeat a step, "
+                "restore a saved state first"
             )
         if time + size > self.stop + allowed:
             raise InvalidInput(

@@ -112,7 +112,7 @@ class UnitInstance:
         pieces = self._pieces(fmi_type, references, len(values))
         for piece in pieces:
             if piece.run is TIME:
-                raise InvalidInput("'time' can be read only: it moves with the steps")
+                raise InvalidInput("'time' can only be read, because it advances with the steps")
             variable = self.unit.settable(piece.run.variable.name)
             if variable.causality is Causality.PARAMETER:
                 variable.checked(values[piece.at].tolist()[0])
@@ -217,7 +217,7 @@ class UnitInstance:
         for piece in targets:
             name = piece.run.variable.name
             if name not in found:
-                raise InvalidInput(f"unit '{self.unit.name}' has no derivative of or by '{name}'")
+                raise InvalidInput(f"unit '{self.unit.name}' has no derivative of or with respect to '{name}'")
             own = np.asarray(found[name]).reshape(-1)
             result[piece.at] = own if piece.places is None else own[piece.places]
         return result
@@ -232,7 +232,7 @@ class UnitInstance:
     def set_state(self, state: object) -> None:
         """fmi2SetFMUstate and fmi3SetFMUState."""
         if not isinstance(state, SavedState):
-            raise InvalidInput("the state that was given is none of this FMU")
+            raise InvalidInput("the given state is not a state of this FMU")
         if any(values.shape != (prod(self._shape(name)),) for name, values in state.derivatives.items()):
             raise InvalidInput(f"the input derivatives of the state do not fit unit '{self.unit.name}'")
         self.unit.set_state(state.snapshot)
@@ -251,7 +251,7 @@ class UnitInstance:
         size = sum(piece.size for piece in pieces)
         if count not in (None, size):
             names = ", ".join(f"'{piece.run.variable.name}'" for piece in pieces)
-            raise InvalidInput(f"{count} values were given or asked for; {names} have {size}")
+            raise InvalidInput(f"{count} values were given or requested; {names} have {size}")
         return pieces
 
     def _require_interpolation(self, capability: str) -> None:

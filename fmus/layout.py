@@ -48,7 +48,7 @@ class Run:
 
 
 #: The independent variable, which FMI 3.0 wants declared (section 2.4.7.4); in FMI 2.0 it has no place.
-TIME = Run(Variable("time", Causality.OUTPUT, "s", "time that the unit has come to"), (), first=-1, reference=0)
+TIME = Run(Variable("time", Causality.OUTPUT, "s", "time that the unit has reached"), (), first=-1, reference=0)
 
 
 def scalar_names(name: str, shape: tuple[int, ...]) -> Iterator[str]:

@@ -1,10 +1,10 @@
-"""What an FMU tells its host's logger of an exception."""
+"""The log messages of an FMU about an exception."""
 
 import traceback
 
 from ..units.errors import InvalidInput, StepFailure
 
-#: Log category of an error that lies in what the caller gave, not in the physics.
+#: Log category of an error in the arguments of a call, not in the physics.
 INVALID_INPUT = "invalidInput"
 
 #: Log category of every other error, and that of warnings.

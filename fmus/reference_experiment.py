@@ -1,4 +1,4 @@
-"""The reference experiment of a unit: what it is given, and what it answers natively, for users of its FMU to repeat.
+"""The reference experiment of a unit: its inputs, and the results of the unit without FMI, which users can repeat.
 
 Parameters keep their defaults, and directions their start values. Every other input that matters by itself, without
 a parameter that it `needs`, is raised at the start and stays so: a number by one in its unit of measure, of a field the

@@ -1,4 +1,4 @@
-"""What an FMU carries by the layered standard FMI-LS-REF: its reference experiment, and the manifest that tells of it.
+"""Members of an FMU by the layered standard FMI-LS-REF: its reference experiment, and the manifest of that.
 
 The manifest is that of FMI-LS-REF 1.0.0-beta.1, the experiment in the format of its predecessor's appendix, which the
 harmonized specification of experiments began with. Inputs and results are tables of comma-separated values: a column

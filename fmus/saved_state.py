@@ -42,4 +42,4 @@ class SavedState:
                 return cls(snapshot, Clock(time, stop), derivatives)
         # NumPy's readers raise whatever the damaged bytes trip them over.
         except Exception as error:
-            raise InvalidInput(f"these bytes are no state of an FMU ({error})") from error
+            raise InvalidInput(f"these bytes are not a state of an FMU ({error})") from error

@@ -1,6 +1,6 @@
-"""Who is at work, on a board that outlives the process: when that ends inside foreign code, the line says whose.
+"""Which unit is working, in memory that outlives the process: if that ends inside an FMU, the message names the FMU.
 
-Nobody reads the board unless the process is watched (`supervision`); then it is memory that two processes share.
+The board is read only if the process is watched (`supervision`); then it is memory that two processes share.
 """
 
 from mmap import mmap

@@ -1,4 +1,4 @@
-"""The warning that a run is about to fail, while it still goes on."""
+"""The warning that a run is about to fail, while it is still running."""
 
 from rich.console import Console
 
@@ -10,7 +10,7 @@ from .coupling.master import Accepted
 
 
 class Alarm:
-    """Tells on the terminal, once for each field, that its alternation from step to step has begun to grow."""
+    """Reports on the terminal, once for each field, that its alternation from step to step has begun to grow."""
 
     def __init__(self, growth: Growth, diagnosis: Diagnosis, console: Console) -> None:
         self._growth = growth

@@ -26,7 +26,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Assembly:
-    """What a scenario asks for, put together; `warnings` tell what is unusual of it.
+    """The master of a scenario with all that it couples; `warnings` name what is unusual of the scenario.
 
     `converged` says of each field ("unit.field") that has to converge in an iterated step by which criterion.
     """
@@ -73,8 +73,8 @@ def _warnings(scenario: Scenario, mesh: Mesh | None) -> list[str]:
     adaptive = scenario.coupling.adaptive
     if scenario.inputs is not None and adaptive is not None:
         warnings.append(
-            f"coupling.adaptive does not judge what the signals of {scenario.inputs.file} do inside of a step; keep "
-            f"`max_ms` ({adaptive.max_ms:g} ms) well below the times in which they change"
+            f"coupling.adaptive does not see how the signals in {scenario.inputs.file} change within a step; keep "
+            f"`max_ms` ({adaptive.max_ms:g} ms) well below the time scale of these changes"
         )
     return warnings
 

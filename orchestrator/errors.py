@@ -28,7 +28,7 @@ class RunError(Exception):
 
 
 class Terminated(RunError):
-    """A unit asked for the end of the simulation before its time."""
+    """A unit requested the end of the simulation before the stop time."""
 
 
 class Interrupted(Exception):
@@ -53,11 +53,11 @@ class ParticipantError(Exception):
 
 
 class ParticipantLost(ParticipantError):
-    """A participant is gone for good: its process died, it did not come back in time, or FMI forbids further calls."""
+    """A participant is lost: its process died, it did not return in time, or FMI forbids further calls."""
 
 
 class ParticipantTerminated(ParticipantError):
-    """A participant asks for the end of the simulation; `time_s` is the last time it reached, where it says so."""
+    """A participant requests the end of the simulation; `time_s` is the last time it reached, where it says so."""
 
     time_s: float | None = None
 

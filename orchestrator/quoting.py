@@ -1,4 +1,4 @@
-"""What a file says, as a message repeats it: short, on one line, and whatever it is."""
+"""Content of a file as a message quotes it: short and on one line, whatever the content is."""
 
 from collections.abc import Mapping, Set
 from typing import Any

@@ -32,7 +32,7 @@ MeshOf = Callable[[Scenario, Path], Mesh | None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """The results folder of a run and its summary; `warnings` tell what is wrong with it, or was not done beside."""
+    """The results folder of a run and its summary; `warnings` name what is wrong with it, or could not be done."""
 
     folder: Path
     summary: dict[str, Any]
@@ -40,13 +40,13 @@ class Outcome:
 
 
 class Companion(AbstractContextManager["Companion"], Observer, Protocol):
-    """What makes something of a run's results while the run goes on, and when it is over (`report.presentation`)."""
+    """Makes figures and reports of a run's results, beside the run and after it (`report.presentation`)."""
 
     def begin(self) -> None:
-        """All results are there; make what is to be made of them, to be waited for by `finish`."""
+        """All results are complete: start to make figures and reports of them; `finish` waits for these."""
 
     def finish(self) -> tuple[str, ...]:
-        """Wait for what was begun; warnings of what could not be made."""
+        """Wait for what `begin` started; the warnings name what could not be made."""
 
 
 def run_scenario(
@@ -152,7 +152,7 @@ def _run(
             implementations = implementation.implementations(assembly.participants)
         except RunError as error:
             if before is not None:
-                raise InputError(f"{folder.path}: {error}; run without --resume to begin anew") from error
+                raise InputError(f"{folder.path}: {error}; run without --resume to start again") from error
             unready, implementations = error, {}
         if before is not None:
             with folder.fitting(), _about(folder.path):

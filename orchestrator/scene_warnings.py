@@ -1,4 +1,4 @@
-"""What is unusual of a scene, told before anything is computed: its mesh, its frame, and places that units name."""
+"""Warnings on a scene, given before anything is computed: on its mesh, its frame, and places that units name."""
 
 from .participants.native import Mesh, mesh_warnings, unit_warnings
 from .scenario import Scenario

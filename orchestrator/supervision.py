@@ -1,4 +1,4 @@
-"""The command `cosim`, watched: whatever ends the process that works, exit code 0 is said of finished work only.
+"""The command `cosim`, watched: whatever ends the working process, exit code 0 is returned for finished work only.
 
 Foreign FMUs run inside that process. One that calls exit(0) ends it as if it had done its work, one that crashes ends
 it without a word. So the work is done in a child process, and the parent, which does nothing else, says what became of
@@ -26,7 +26,7 @@ _STOPPING = (signal.SIGTSTP, signal.SIGCONT)
 
 
 def watch(work: Callable[[], None]) -> None:
-    """Do `work` in a child process, and end this one with the exit code that fits what became of it.
+    """Do `work` in a child process, and end this one with the exit code that fits how the child ended.
 
     Where the system cannot do that, the work is done here.
     """
@@ -67,7 +67,7 @@ def _end(board: activity.Board, work: Callable[[], None]) -> None:
 
 
 def end_with(parent: int) -> None:
-    """Nobody is left alone: when the `parent` of this process is gone, it is killed, on Linux."""
+    """On Linux, have this process killed when its `parent` has ended."""
     if sys.platform != "linux":
         return
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
@@ -101,7 +101,7 @@ def _verdict(status: int, board: activity.Board) -> int:
     if killed and not where and number in _PASSED_ON:
         return 128 + number
     how = f"was ended by {signal.Signals(number).name}" if killed else f"was ended by a call of exit({number})"
-    who = f"in {where}, which takes all of `cosim` along" if where else "outside of any unit"
+    who = f"in {where}, which ended all of `cosim`" if where else "outside of any unit"
     sys.stderr.write(
         f"failed: the process {how} {who}. Results up to the last step are in the results folder; "
         "run that unit in a process of its own with run.workers=processes\n"

@@ -1,4 +1,4 @@
-"""What the operating system does not let us write before a run has begun."""
+"""Errors for folders and files that cannot be written, before a run has begun."""
 
 import errno
 from collections.abc import Iterator
@@ -51,9 +51,9 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def _raise_if_full(path: Path, error: OSError) -> None:
-    """RunError where there is no room: nothing is wrong with what the person chose."""
+    """RunError where the disk is full: the person's choice is not wrong."""
     if error.errno in _FULL:
         raise RunError(
-            f"not all can be written ({error.filename or path}: {error.strerror}); make room, or choose another "
-            "--output"
+            f"some results cannot be written ({error.filename or path}: {error.strerror}); make room, or choose "
+            "another --output"
         ) from None

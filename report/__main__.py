@@ -14,7 +14,7 @@ from typing import Any
 
 from ..orchestrator.supervision import end_with
 from .heading import heading
-from .presentation import FIGURES
+from .presentation import FIGURES, PAGE
 
 
 def main() -> None:
@@ -25,19 +25,25 @@ def main() -> None:
     end_with(parent)
     # Imported here: from now on the process ends with the other one.
     from .figures.draw import draw_figures, draw_still
+    from .page import prepared, write_page
 
     # Whatever a library has to say is no answer.
     answers, sys.stdout = sys.stdout, sys.stderr
     still: dict[str, bytes] = {}
+    views = None
     for line in sys.stdin:
         answer: dict[str, Any] = {}
         try:
             if line.startswith("begun "):
                 if FIGURES in parts:
                     still = draw_still(folder, heading(**json.loads(line.removeprefix("begun "))))
+                if PAGE in parts:
+                    views = prepared(folder)
                 continue
             if FIGURES in parts:
                 draw_figures(folder, still)
+            if PAGE in parts:
+                write_page(folder, views)
         except OSError as error:
             answer = {"place": str(error.filename or folder), "refused": error.strerror or str(error)}
         except Exception:

@@ -165,7 +165,7 @@ class Bench:
         try:
             cost = future.result()
         except KilledWorker:
-            raise RunError(f"the process that ran {point} again died; start the same command again") from None
+            raise RunError(f"the process that measured {point} again died; run the same command again") from None
         finally:
             future.release()
         trials[point.key] = trial = replace(trials[point.key], costs=(*trials[point.key].costs, cost))
@@ -182,7 +182,7 @@ class Bench:
             return Trial(
                 self._place(point),
                 CRASHED,
-                "the process that ran it died, perhaps by foreign code; run that scenario by itself to learn more",
+                "the process that ran it died, perhaps in the code of an FMU; run that scenario alone to learn more",
             )
         finally:
             future.release()
@@ -199,8 +199,8 @@ class Bench:
             self._seen_alive = now
         elif now - self._seen_alive > _PATIENCE_S:
             raise RunError(
-                f"there has been no worker for {_PATIENCE_S:g} s; what is finished is in {self.folder}: start workers, "
-                "and the same command goes on from there"
+                f"there has been no worker for {_PATIENCE_S:g} s; what is finished is in {self.folder}: start workers "
+                "and run the same command again to continue"
             )
 
     def _started(self) -> Cluster:

@@ -56,7 +56,7 @@ def _references(value: Any) -> list[Settings]:
         )
     for each in references:
         if "results" in each and (len(each) > 1 or not isinstance(each["results"], str)):
-            raise ValueError("`results` is the path of a results folder, and stands alone")
+            raise ValueError("`results` is the path of a results folder and cannot be combined with settings")
         if not each:
             raise ValueError("a reference needs settings that are finer than those of the lines")
     return references

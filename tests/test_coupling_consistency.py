@@ -158,7 +158,10 @@ def test_a_step_repeated_from_a_saved_state_leaves_no_trace(small_scenario: Path
 @pytest.mark.parametrize(
     ("setting", "words"),
     [
-        ("{converge: {strech: {relative: 1e-4}}}", "'strech' is no connected output; did you mean 'mechanics.stretch'"),
+        (
+            "{converge: {strech: {relative: 1e-4}}}",
+            "'strech' is not a connected output; did you mean 'mechanics.stretch'",
+        ),
         ("{converge: {fiber: {relative: 1e-4}}}", "fibers.fiber is exchanged in no loop"),
         ("{converge: {stretch: {}}}", "give a limit: `relative`, `absolute` or `residual-relative`"),
         ("{converge: {stretch: {relativ: 1e-4}}}", "did you mean 'relative'"),

@@ -62,7 +62,7 @@ def test_explicit_coupling_fails_beyond_a_gain_of_one_and_holds_stabilised(
     # Inside of the boundary it holds by itself. The potential has its peak, and with it the gain, at the end.
     inside = _stress(tmp_path / "inside", _eta(3.0), _share(0.0), size, *scheme)
     assert np.isfinite(inside).all()
-    with pytest.raises(RunError, match="length_dependence 5 turns it negative"):
+    with pytest.raises(RunError, match="length_dependence 5 makes the active stress negative"):
         _stress(tmp_path / "outside", _eta(5.0), _share(0.0), size, *scheme)
     stabilised = _stress(tmp_path / "stabilised", _eta(5.0), size, *scheme)
     iterated = _stress(tmp_path / "iterated", _eta(5.0), size, _ITERATED)
@@ -73,7 +73,7 @@ def test_half_of_the_stiffness_is_enough_where_the_formula_says_so(tmp_path: Pat
     # |g (1 − w)/(1 − w g)| < 1 for w > (1 + g)/(2 g): 0.13 at the g of −1.36 that the cell has here.
     steps = ("coupling.step_ms=1", "run.stop_ms=60", "output.every_ms=60")
     assert np.isfinite(_stress(tmp_path / "enough", _eta(5.0), _share(0.2), *steps)).all()
-    with pytest.raises(RunError, match="turns it negative"):
+    with pytest.raises(RunError, match="makes the active stress negative"):
         _stress(tmp_path / "little", _eta(5.0), _share(0.05), *steps)
 
 
@@ -135,7 +135,7 @@ def test_a_mechanics_that_is_told_the_stiffness_alone_takes_its_own_stretch(tmp_
 @pytest.mark.parametrize("scheme", [_HELD, _JACOBI, _LINEAR], ids=["gauss-seidel", "jacobi", "linear inputs"])
 def test_a_heart_holds_across_the_boundary(scheme: tuple[str, ...], small_scenario: Path, tmp_path: Path) -> None:
     sets = ("run.stop_ms=12", "output.every_ms=12", _eta(6.0), *scheme, _AWAKE)
-    with pytest.raises(RunError, match="length_dependence 6 turns it negative"):
+    with pytest.raises(RunError, match="length_dependence 6 makes the active stress negative"):
         _run(small_scenario, tmp_path / "outside", *sets, _share(0.0))
     held = _run(small_scenario, tmp_path / "held", *sets)["timeseries"]
     finer = _run(small_scenario, tmp_path / "finer", *sets, "coupling.step_ms=0.5")["timeseries"]

@@ -126,7 +126,7 @@ class ActiveStress(Differentiable):
             "active_stiffness",
             Causality.OUTPUT,
             "kPa",
-            "derivative of the active stress by the stretch",
+            "derivative of the active stress with respect to the stretch",
             Location.NODE,
             depends_on=("potential",),
             pointwise=True,
@@ -179,7 +179,7 @@ class ActiveStress(Differentiable):
         if not np.abs(active_stress).max() <= _LARGEST_KPA:
             node = int(np.abs(active_stress).argmax())
             raise StepFailure(
-                f"the active stress at node {node} is {active_stress[node]:.3g} kPa, which no tissue bears"
+                f"the active stress at node {node} is {active_stress[node]:.3g} kPa, more than any tissue bears"
             )
         return {"tension": tension, "active_stress": active_stress, **self._reference(inputs)}
 
@@ -240,5 +240,7 @@ class ActiveStress(Differentiable):
             return 1.0
         factor = 1.0 + eta * (self._average @ stretch - 1.0)
         if factor.min() < 0.0:
-            raise StepFailure(f"length_dependence {eta:g} turns it negative at node {factor.argmin()}")
+            raise StepFailure(
+                f"length_dependence {eta:g} makes the active stress negative at node {factor.argmin()}; lower it"
+            )
         return np.asarray(factor)

@@ -1,4 +1,4 @@
-"""The derivative of the active stress by potential and stretch: that of the step's closed forms, node by node.
+"""The derivative of the active stress with respect to potential and stretch: the step's closed forms, node by node.
 
 A ramped step is a mean over the moments m at which the potential may change, whose part of the earlier tension is
 

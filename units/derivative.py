@@ -1,4 +1,4 @@
-"""The derivative of a unit's output fields by its inputs, at what its state was computed from: a linear map."""
+"""The derivative of a unit's output fields with respect to its inputs at its last step: a linear map."""
 
 from typing import Protocol
 

@@ -101,7 +101,9 @@ class Differentiable(Unit):
         known = {variable.name: variable for variable in variables}
         for name in seed:
             if self.variable(name).name not in known:
-                raise InvalidInput(f"'{name}' of unit '{self.name}' is no {what}; derivatives know: {listed(known)}")
+                raise InvalidInput(
+                    f"'{name}' of unit '{self.name}' is not an {what}; derivatives exist for: {listed(known)}"
+                )
         return {
             name: checked_field(variable, seed[name], self.mesh, self.name)
             if name in seed
@@ -116,8 +118,8 @@ class Differentiable(Unit):
             state, taken = self._foresee(), Taken.initially(self._inputs)
         elif self._taken is None:
             raise InvalidInput(
-                f"the state given to unit '{self.name}' does not say which step it came from; derivatives are known "
-                "after the next step"
+                f"the state given to unit '{self.name}' does not say which step it came from; derivatives are "
+                "available after the next step"
             )
         else:
             state, taken = self._state, self._taken

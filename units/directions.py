@@ -50,7 +50,7 @@ def check_directions(name: str, directions: FloatArray, normal_to: FloatArray | 
     if off.max() > _TOLERANCE:
         where = int(off.argmax())
         raise InvalidInput(
-            f"input '{name}' is no unit vector in element {where}: {directions[where].tolist()}; "
+            f"input '{name}' is not a unit vector in element {where}: {directions[where].tolist()}; "
             f"connect it to the output '{name}' of a fibre generator"
         )
     if normal_to is not None:
@@ -58,5 +58,6 @@ def check_directions(name: str, directions: FloatArray, normal_to: FloatArray | 
         if cosine.max() > _TOLERANCE:
             where = int(cosine.argmax())
             raise InvalidInput(
-                f"input '{name}' is not normal to the fibre in element {where} (cosine {cosine[where]:.3g})"
+                f"input '{name}' is not normal to the fibre in element {where} (cosine {cosine[where]:.3g}); "
+                "take both from the same fibre generator"
             )

@@ -18,7 +18,7 @@ def checked_field(variable: Variable, value: ArrayLike | str, mesh: Mesh, unit: 
     try:
         array = frozen(value)  # type: ignore[arg-type]
     except (TypeError, ValueError) as error:
-        raise InvalidInput(f"{what} takes real numbers, not this: {error}") from None
+        raise InvalidInput(f"{what} has to be real numbers: {error}") from None
     expected = variable.shape(mesh)
     if array.shape != expected:
         raise InvalidInput(f"{what} got shape {array.shape}, expected {expected}")

@@ -1,4 +1,4 @@
-"""Where a unit stands in its life."""
+"""The phases of a unit's life cycle."""
 
 from enum import Enum
 

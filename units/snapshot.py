@@ -103,7 +103,7 @@ class Snapshot:
             time, step, held = (0.0, 0.0, 1.0) if times is None else times.tolist()
         # NumPy's readers raise whatever the damaged bytes trip them over.
         except Exception as error:
-            raise InvalidInput(f"the bytes are no serialized state of a unit ({error})") from error
+            raise InvalidInput(f"the bytes are not a serialized state of a unit ({error})") from error
 
         def group(name: str) -> dict[str, FloatArray]:
             return {key.removeprefix(f"{name}/"): value for key, value in arrays.items() if key.startswith(f"{name}/")}

@@ -69,7 +69,7 @@ def statistics(fields: tuple[Variable, ...]) -> Iterator[Statistic]:
 
 def _statistic(field: Variable, kind: Kind) -> Statistic:
     what = field.name if field.components == 1 else f"the magnitude of {field.name}"
-    missing = "" if field.missing is None else f" that have one; {field.missing:g} while there are none"
+    missing = "" if field.missing is None else f" that have a value; {field.missing:g} as long as none has"
     return Statistic(
         name=f"{field.name}_{kind.value}",
         causality=Causality.OUTPUT,

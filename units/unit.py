@@ -198,7 +198,9 @@ class Unit(ABC):
         """
         self._require(Phase.STEPPING)
         if not (np.isfinite(time) and np.isfinite(step) and step >= 0.0):
-            raise InvalidInput(f"unit '{self.name}' cannot step from {time} s by {step} s: both finite, the step >= 0")
+            raise InvalidInput(
+                f"unit '{self.name}' cannot step from {time} s by {step} s: both have to be finite, the step >= 0"
+            )
         inputs = self._inputs | self._ends(ends) if ends else self._inputs
         taken = Taken(self._state, self._inputs, inputs, time * _MS_PER_S, step * _MS_PER_S)
         with self._naming_parameters():
@@ -394,7 +396,9 @@ class Unit(ABC):
         for name, value in ends.items():
             variable = self.variable(name)
             if not self.interpolates or variable.causality is not Causality.INPUT or variable.fixed:
-                raise InvalidInput(f"'{name}' of unit '{self.name}' keeps its value over a step; it has no other end")
+                raise InvalidInput(
+                    f"'{name}' of unit '{self.name}' keeps its value over a step; it takes no value at the end"
+                )
             checked[name] = self._field(variable, value)
         return checked
 
@@ -427,7 +431,7 @@ class Unit(ABC):
             if not unusual and isinstance(error, ArithmeticError):
                 raise
             reason = str(error) or type(error).__name__
-            raise StepFailure(f"nothing can be computed any more ({reason}){unusual}") from error
+            raise StepFailure(f"the computation cannot continue ({reason}){unusual}") from error
 
     def _unusual_parameters(self) -> str:
         """The given parameters farthest from their defaults, to be put behind a message."""
@@ -452,7 +456,7 @@ class Unit(ABC):
             allowed = " or ".join(phase.value for phase in phases)
             raise CallOrderError(
                 f"unit '{self.name}' is {self.phase.value}; this call needs it to be {allowed}. "
-                "Order: instantiate, setup_experiment, enter and exit initialization mode, do_step, terminate"
+                "The order is: instantiate, setup_experiment, enter and exit initialization mode, do_step, terminate"
             )
 
     def _default(self, variable: Variable) -> FloatArray:

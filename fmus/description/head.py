@@ -20,7 +20,7 @@ def head(unit: type[Unit], token: str, fmi: int) -> Iterator[str]:
     yield "<LogCategories>"
     yield tag("Category", name=WARNING_CATEGORY, description=f"Messages with the status fmi{fmi}Warning", end=True)
     yield tag("Category", name=ERROR_CATEGORY, description=f"Messages with the status fmi{fmi}Error", end=True)
-    yield tag("Category", name=INVALID_INPUT, description="Errors in what the caller gave", end=True)
+    yield tag("Category", name=INVALID_INPUT, description="Errors in the arguments of a call", end=True)
     yield "</LogCategories>"
     # A heartbeat in steps of a millisecond.
     yield tag("DefaultExperiment", startTime="0", stopTime="0.32", stepSize="0.001", end=True)

@@ -1,4 +1,4 @@
-"""What is told of a field that alternates from step to step."""
+"""The record of a field that alternates from step to step."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class Alternation:
     share: float
 
     def worse_than(self, other: "Alternation | None") -> bool:
-        """Whether this one is rather to be told than `other`."""
+        """Whether this one is to be reported before `other`."""
         if other is None:
             return True
         ranks = KINDS.index(self.kind), KINDS.index(other.kind)

@@ -1,4 +1,4 @@
-"""From the coupling section of a scenario to the scheme that it asks for."""
+"""Makes the coupling scheme that the coupling section of a scenario describes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -20,7 +20,7 @@ from .timeline import Timeline
 _RELAXATION = 0.5
 
 #: What is asked of a field that a loop's sweeps start from and that no criterion names (`convergence`).
-_UNNAMED = "no criterion of its own; relative to its magnitude, its residual is held to the strictest of those given"
+_UNNAMED = "no criterion of its own: its residual, relative to its magnitude, has to meet the strictest given criterion"
 
 
 def build_scheme(
@@ -68,7 +68,7 @@ def build_scheme(
 def build_master(
     scenario: Scenario, participants: Mapping[str, Participant], connections: Sequence[Connection], scheme: Scheme
 ) -> Master:
-    """The master of a scenario; InputError where a unit cannot do what the scenario asks for."""
+    """The master of a scenario; InputError where a unit lacks an ability that the scenario needs."""
     coupling, stop, every = scenario.coupling, scenario.run.stop_ms, scenario.output.every_ms
     control: StepControl
     if coupling.adaptive is None:
@@ -126,7 +126,7 @@ def _criteria(settings: Iterate, connections: Sequence[Connection]) -> dict[str,
     for key, limits in settings.converge.items():
         found = [name for name, end in known.items() if key in (name, end.name)]
         if len(found) != 1:
-            problem = "names several fields" if found else "is no connected output"
+            problem = "names several fields" if found else "is not a connected output"
             raise InputError(f"coupling.iterate.converge: '{key}' {problem}{did_you_mean(key, known)}")
         criteria[found[0]] = Criterion(limits.absolute, limits.relative, limits.residual_relative)
     return criteria

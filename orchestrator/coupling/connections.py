@@ -240,8 +240,8 @@ def _of_entry(entry: ConnectionEntry, participants: Mapping[str, Participant]) -
 def _check(connection: Connection, source: Port, target: Port) -> None:
     if not _converts(source.type, target.type):
         raise InputError(
-            f"connections: '{connection}': the types differ, {source.type} -> {target.type}, and the one does not "
-            "become the other; connect another output, or change the type in one of the FMUs"
+            f"connections: '{connection}': the types differ, {source.type} -> {target.type}, and the first cannot "
+            "be converted to the second; connect another output, or change the type in one of the FMUs"
         )
     if connection.law is not None and not target.is_real:
         raise InputError(

@@ -1,10 +1,10 @@
-"""What the inputs of a step were wrong by, as far as the values at its two ends tell.
+"""The error of the inputs of a step, estimated from the values at its two ends.
 
-Between its ends an output is taken to run along a line, and the line to be wrong by as much as the value at the end is
-from the line through the two values before. An input that a unit ramps to the value known for the end follows that
-line. One that is held errs by half the change over the step, whatever the line; so does, by the whole of it, one whose
-value at the end is not known and taken to be the last. A unit without memory is not concerned by what an input is
-inside a step.
+Within a step an output is assumed to vary linearly, and the error of that to be the distance of the value at the end
+from the line through the two values before. An input with first-order hold, to a value that is known for the end, has
+only this error. With zero-order hold a second error is half the change over the step. Where the value at the end is not
+known and taken to be the last one, the second error is the whole change. The course of an input within a step does not
+matter to a unit without memory.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ from .exchange import Exchange
 
 @dataclass(frozen=True)
 class Deviation:
-    """What a connected output, or an input fed by it, was wrong by; of which order in the step."""
+    """The error of a connected output, or of an input fed by it, and its order of accuracy in the step."""
 
     end: End
     values: Values
@@ -28,7 +28,7 @@ def deviations(exchange: Exchange, participants: Mapping[str, Participant]) -> I
     """The deviations of a step just taken, of outputs that took it and have a past."""
     for end in exchange.moving:
         if exchange.stepped(end) and exchange.depth(end) > 1:
-            yield Deviation(end, exchange.latest(end) - exchange.foretold(end, 1), 2)
+            yield Deviation(end, exchange.latest(end) - exchange.extrapolated(end, 1), 2)
     for link, use in exchange.used():
         end = link.source
         if exchange.depth(end) < 2:

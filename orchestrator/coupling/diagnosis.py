@@ -1,6 +1,6 @@
-"""What a person is told of fields that alternate from step to step: why theory says they do, and what helps.
+"""The report on fields that alternate from step to step: the cause according to theory, and what helps.
 
-In a loop of units that answer at once, and whose gain is g, an error is multiplied by z at every exchange, with
+In a loop of units that respond without delay, with the gain g, an error is multiplied by z at every exchange, with
 
     1 = g E(z)ᵐ,   E(z) = 1 − (1 − 1/z)^{p+1},
 
@@ -63,7 +63,7 @@ class Diagnosis:
         )
 
     def paragraphs(self, found: Mapping[str, Alternation]) -> list[str]:
-        """What is to be told of alternating fields, one paragraph for each loop; those that die away are left out."""
+        """The report on alternating fields, a paragraph for each loop; those that decay are left out."""
         alive = {self._end(name): each for name, each in found.items() if each.kind != DECAYING}
         told = []
         for group in groups_in_order(self._units, self._links):
@@ -85,7 +85,7 @@ class Diagnosis:
         rate = f"grows by a factor of {found.rate:.3g}" if grows else f"keeps {found.rate:.0%} of its amplitude"
         what = (
             f"{leader} alternates from exchange to exchange with a period of {found.period_steps}, and {rate} at each, "
-            f"from {found.from_ms:g} to {found.to_ms:g} ms, at the end by {found.share:.1%} of how far it has moved"
+            f"from {found.from_ms:g} to {found.to_ms:g} ms; at the end its amplitude is {found.share:.1%} of its range"
             + (f"; the same holds for {others}" if others else "")
         )
         return ". ".join([what, *self._reasons(leader, found, circle)])
@@ -94,8 +94,8 @@ class Diagnosis:
         """Why it does, and what helps."""
         if circle is None:
             return [
-                f"It is exchanged in no loop, so that unit '{leader.unit}' alternates by itself, as explicit methods "
-                "do in steps that are too long for them: take shorter steps, inside that unit or by coupling.step_ms"
+                f"It is exchanged in no loop, so unit '{leader.unit}' alternates by itself, as explicit methods "
+                "do when their steps are too long: take shorter steps, inside that unit or by coupling.step_ms"
             ]
         if not isinstance(self._scheme, GaussSeidel | Jacobi):
             return [
@@ -112,13 +112,13 @@ class Diagnosis:
         return [
             f"It is exchanged in the loop {circle}, which is coupled explicitly: its gain g multiplies an error in "
             f"every round, {relation}",
-            f"If all its units answer at once, |g| is about {gain:.3g} here, errors grow where it is above "
-            f"{limit:.3g}, and no step is short enough; if one of them has memory, a shorter or a longer step may do",
+            f"If all its units respond without delay, |g| is about {gain:.3g} here, errors grow where it is above "
+            f"{limit:.3g}, and no step is short enough; if one of them has memory, a shorter or a longer step may help",
             f"What helps: {'; or '.join(self._remedies(leader, circle, gain))}",
         ]
 
     def _gain(self, rate: float, period: int, circle: _Circle) -> float:
-        """|g| of the loop if its units answer at once; see the module."""
+        """|g| of the loop if its units respond without delay; see the module."""
         factor = rate * cmath.exp(2j * pi / period)
         return float(abs(1.0 - (1.0 - 1.0 / factor) ** (self._extrapolated + 1)) ** -circle.waiting)
 
@@ -131,7 +131,7 @@ class Diagnosis:
                 f"`converge: {{{leader}: {{relative: 1e-4}}}}`, which solves the loop in every step"
             )
         if self._extrapolated > 0 and gain < 1.0:
-            remedies.append("coupling.extrapolation: 0, with which errors grow above |g| = 1 only")
+            remedies.append("coupling.extrapolation: 0, with which errors grow only above |g| = 1")
         fed = {link.target for link in self._links}
         givers = [unit for unit in units if _STABILISER in self._participants[unit].outputs]
         for unit in units:
@@ -143,7 +143,9 @@ class Diagnosis:
                     f"the connection {givers[0]}.{_STABILISER} -> {unit}.{_STABILISER}{needs}, which stabilise"
                     f"{'s' if live else ''} the explicit loop"
                 )
-        return remedies or ["another split of the units: one of them cannot roll back, so that nothing can be iterated"]
+        return remedies or [
+            "another split of the units, because one of them cannot roll back and the loop cannot be iterated"
+        ]
 
     def _circle(self, end: End, found: Alternation) -> _Circle | None:
         """The shortest closed way that a value of `end` goes, with as many unknown values as fit its period."""

@@ -4,9 +4,9 @@ A unit that steps needs its inputs over the step. An output that has been comput
 of another only the past is known, and it is extrapolated by a polynomial through the last exchanges (order 0: its last
 value). A unit that ramps its inputs gets their values at the begin and the end of its step; any other sees the value
 at the end, held. A discrete output, a whole number or a text for instance, changes at events only: it is neither
-extrapolated nor ramped, and is what it was at the last exchange until it is known anew. FMI 2.0 leaves open which time
-an input belongs to that is set before a step (its section 4.2.4 lets a master set what it likes); here it is always the
-step's end.
+extrapolated nor ramped, and keeps its value of the last exchange until the next one is known. FMI 2.0 leaves open
+which time an input belongs to that is set before a step (its section 4.2.4 lets a master set any value); here it is
+always the step's end.
 """
 
 import json
@@ -168,8 +168,8 @@ class Exchange:
         self._values.update(values)
         self._known.update(values)
 
-    def foretold(self, end: End, order: int | None = None) -> Values:
-        """What the past values say of an output at the step's end, by the inputs' order if none is given."""
+    def extrapolated(self, end: End, order: int | None = None) -> Values:
+        """An output extrapolated from its past values to the end of the step, by default in the order of inputs."""
         if end not in self._histories:
             return self._values[end]
         return self._histories[end].extrapolated(self._end, self._behaviour.extrapolation if order is None else order)
@@ -230,7 +230,7 @@ class Exchange:
     def _at_end(self, source: End) -> Values:
         if source in self._known or source not in self._histories:
             return self._values[source]
-        return self.foretold(source)
+        return self.extrapolated(source)
 
     def _ramp(self, unit: str, link: Connection, port: Port) -> Ramp:
         """How the input `port` runs over the step, fed by `link`."""

@@ -61,7 +61,7 @@ _LARGEST = 700.0
 
 @dataclass(frozen=True)
 class _Proof:
-    """When an alternation is told of: after so many `steps` whose factors are the median of them within `steady`.
+    """When an alternation is reported: after so many `steps` whose factors are the median of them within `steady`.
 
     The `rate` and the amplitude over the field's motion, `share`, have to be above these.
     """
@@ -127,7 +127,7 @@ class Growth:
 
     @property
     def found(self) -> dict[str, Alternation]:
-        """By field, the worst that is to be told of it; fields that are sound have no entry."""
+        """By field, the worst alternation to be reported; fields that do not alternate have no entry."""
         return {str(end): track.worst for end, track in self._tracks.items() if track.worst is not None}
 
     @property
@@ -196,7 +196,7 @@ class _Track:
         return _factor(self._factors[lag][0] / lag) if bent and self._counts[lag] else 0.0
 
     def suspected(self) -> Alternation | None:
-        """What is to be told of the last steps if they were the last before the run failed."""
+        """The alternation to be reported of the last steps, if the run failed after them."""
         # A run may fail before it has any value.
         return self._judged(_SUSPICION, self._times[0]) if self._times else None
 

@@ -1,4 +1,4 @@
-"""What an output was at the last exchanges, and the polynomial through it."""
+"""The values of an output at the last exchanges, and the polynomial through them."""
 
 from collections import deque
 from collections.abc import Sequence

@@ -122,7 +122,7 @@ class Iterated:
 
     def _iterate(self, group: Sequence[str], exchange: Exchange, step: Step, before: Sweeps) -> Sweeps:
         links = self._moving(group)
-        exchange.overwrite({end: exchange.foretold(end) for end in _sources(links)})
+        exchange.overwrite({end: exchange.extrapolated(end) for end in _sources(links)})
         with Rollback(self._participants, group) as begin:
 
             def sweep(number: int) -> None:
@@ -171,7 +171,7 @@ class Iterated:
         return before.with_loop(convergence, False)
 
     def memory(self) -> dict[str, Any]:
-        """See Scheme: the scales of the fields. What the acceleration keeps of earlier steps is learned anew."""
+        """See Scheme: the scales of the fields. What the acceleration kept of earlier steps is discarded."""
         return {"scales": {str(end): np.array(scale) for end, scale in self._scales.items()}}
 
     def resume(self, memory: Mapping[str, Any]) -> None:

@@ -180,7 +180,7 @@ class Master:
         if not self._initialised:
             self.initialise()
         if self._number == 0:
-            with _failing("failed at its initialisation"):
+            with _failing("failed during initialisation"):
                 self._show(Accepted(0, 0.0, 0.0, self._settled, spans=self.watch.lap()), observers)
         while not self.done and not stop:
             accepted = self._take_step()
@@ -216,7 +216,7 @@ class Master:
         """Initialise, and go on from what `memory` gave, perhaps in another process."""
         self.initialise()
         for unit in self.units:
-            with blaming(unit), _failing("cannot go on from the checkpoint"):
+            with blaming(unit), _failing("cannot continue from the checkpoint"):
                 self.participants[unit].unpack(memory["states"][unit].tobytes())
             self._reached[unit] = int(memory["reached"][unit])
             self._passed[unit] = int(memory["passed"][unit])
@@ -237,7 +237,7 @@ class Master:
     @contextmanager
     def _initialising(self, label: str) -> Iterator[None]:
         measured = self.watch.measure(WAITING, "initialise"), self.watch.measure(label, "initialise")
-        with measured[0], measured[1], _failing("failed at its initialisation"):
+        with measured[0], measured[1], _failing("failed during initialisation"):
             yield
 
     def _begin(self, unit: str) -> None:
@@ -266,7 +266,7 @@ class Master:
                 with self._initialising(unit):
                     self._complete(unit)
 
-        with _failing("failed at its initialisation"):
+        with _failing("failed during initialisation"):
             settled = self._scheme.settle(loop, self.exchange, complete)
         self._settled = Sweeps((*self._settled.loops, *settled.loops), self._settled.converged and settled.converged)
         for unit in loop:

@@ -1,4 +1,4 @@
-"""The states of several units at one moment, kept to go back to."""
+"""The states of several units at one moment, kept in order to return to them."""
 
 from collections.abc import Iterable, Mapping
 from types import TracebackType

@@ -75,7 +75,7 @@ class Scheme(Protocol):
 
 
 class Sweep(Scheme, Protocol):
-    """A scheme that steps every unit once, and can therefore be repeated until the exchanged values stand still."""
+    """A scheme that steps every unit once, and can therefore be repeated until the exchanged values have converged."""
 
     def carried(self, units: Sequence[str], links: Sequence[Connection]) -> list[End]:
         """The outputs of `units`, connected by `links`, whose values before a sweep decide its outcome."""

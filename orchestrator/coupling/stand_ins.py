@@ -1,4 +1,4 @@
-"""Inputs that somebody has to give: what they start with only stands in for it."""
+"""Inputs that another unit has to provide: their start values are only placeholders."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -12,8 +12,8 @@ def check_stand_ins(
 ) -> None:
     """InputError for an input with a stand-in that no output feeds; `started` are those with a start value, by unit.
 
-    A fibre direction, for instance, starts as any unit vector, so that a unit runs by itself; a heart with such fibres
-    would be none.
+    A fibre direction, for instance, starts as any unit vector, so that a unit runs by itself; with such fibres
+    the results of a heart would be meaningless.
     """
     for name, participant in participants.items():
         fed = {link.target.name.partition("[")[0] for link in connections if link.target.unit == name}
@@ -21,6 +21,6 @@ def check_stand_ins(
         for port in participant.inputs.values():
             if port.stand_in and port.name not in fed | given:
                 raise InputError(
-                    f"units.{name}: no output feeds its input '{port.name}', which another unit has to give; "
-                    f"add a unit with an output '{port.name}' (fiber_generator has those of fibres), or a connection"
+                    f"units.{name}: no output feeds its input '{port.name}', which another unit has to provide; "
+                    f"add a unit with an output '{port.name}' (fiber_generator provides fibres), or a connection"
                 )

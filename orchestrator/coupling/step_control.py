@@ -228,7 +228,7 @@ class AdaptiveStep:
         for end in exchange.moving:
             if exchange.stepped(end):
                 name, value = str(end), exchange.latest(end)
-                origin = self._origins.setdefault(name, exchange.foretold(end, 0))
+                origin = self._origins.setdefault(name, exchange.extrapolated(end, 0))
                 change = _magnitude(value - origin)
                 if change > _NO_CHANGE * max(_magnitude(value), _magnitude(origin)):
                     ranges[name] = max(ranges.get(name, 0.0), change)

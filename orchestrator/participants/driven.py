@@ -99,7 +99,7 @@ class Driven:
 def drive(
     participants: Mapping[str, Participant], connected: Iterable[tuple[str, str]], path: Path, ramps: bool
 ) -> dict[str, Participant]:
-    """`participants`, those that have inputs of which the file at `path` has signals as Driven ones.
+    """`participants`; those whose inputs have signals in the file at `path` are replaced by Driven ones.
 
     `connected` are the inputs, by unit and name, that are fed otherwise. InputError for columns that drive nothing, or
     what is driven or connected already, and for what is no value of the input.
@@ -149,7 +149,7 @@ def _target(column: str, participants: Mapping[str, Participant], fed: set[tuple
     known = {f"{unit}.{name}" for unit, participant in participants.items() for name in participant.inputs}
     if not unit or unit not in participants:
         known |= {name for participant in participants.values() for name in participant.inputs}
-    raise InputError(f"column '{column}' is no input{did_you_mean(column, known)}")
+    raise InputError(f"column '{column}' is not an input of any unit{did_you_mean(column, known)}")
 
 
 def _is_fed(unit: str, name: str, inputs: Ports, fed: set[tuple[str, str]]) -> bool:

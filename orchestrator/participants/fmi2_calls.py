@@ -123,7 +123,7 @@ class Fmi2Calls:
         return bool(ended.value)
 
     def _end(self) -> ParticipantTerminated:
-        end, time = ParticipantTerminated("it asks for the end of the simulation (fmi2Terminated)"), fmi2Real()
+        end, time = ParticipantTerminated("it requested the end of the simulation (fmi2Terminated)"), fmi2Real()
         with suppress(FMICallException), self.log.aside():
             self._slave.fmi2GetRealStatus(self._slave.component, fmi2LastSuccessfulTime, byref(time))
             end.time_s = time.value

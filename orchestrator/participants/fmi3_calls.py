@@ -106,12 +106,12 @@ class Fmi3Calls:
         if trouble is not None:
             raise trouble
         if terminate:
-            end = ParticipantTerminated("it asks for the end of the simulation (terminateSimulation)")
+            end = ParticipantTerminated("it requested the end of the simulation (terminateSimulation)")
             end.time_s = reached
             raise end
         if early:
             raise ParticipantError(
-                f"it returned from its step early, at {reached:g} s, which it was not allowed to (earlyReturnAllowed)"
+                f"it returned from its step early, at {reached:g} s, although that is not allowed (earlyReturnAllowed)"
             )
 
     def save(self) -> Any:

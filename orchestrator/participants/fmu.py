@@ -89,7 +89,7 @@ class Calls(Protocol):
         """Set an input's time derivative of `order` from the field's buffer."""
 
     def run(self, ramps: Sequence[tuple[Field, Ramp]]) -> None:
-        """Let inputs run over the next step, where the FMU asks for what they are inside of it."""
+        """Let inputs vary over the next step, for an FMU that asks for intermediate values."""
 
     def set_start(self, variable: Any, value: Any) -> None:
         """Set a variable of any type, an array to one value everywhere or to a list; `variable` is FMPy's."""
@@ -303,13 +303,13 @@ class FmuParticipant:
             except ParticipantError as error:
                 if order == 1:
                     raise ParticipantError(
-                        f"it takes no derivatives of its inputs, though canInterpolateInputs is true ({error}); "
+                        f"it refuses derivatives of its inputs, although canInterpolateInputs is true ({error}); "
                         "use `coupling.interpolation: hold`"
                     ) from None
                 self._order = order - 1
                 print(
-                    f"note: unit '{self.name}' takes derivatives of its inputs up to order {self._order}; "
-                    f"what `coupling.extrapolation` gives beyond that is left out ({error})",
+                    f"note: unit '{self.name}' accepts derivatives of its inputs up to order "
+                    f"{self._order}; those of higher order from `coupling.extrapolation` are left out ({error})",
                     file=sys.stderr,
                 )
                 self._differentiate(name, ramp, size)
@@ -451,7 +451,7 @@ class FmuParticipant:
         if key in _ONLY_ONES:
             raise InputError(
                 f"this FMU can be instantiated only once per process (canBeInstantiatedOnlyOncePerProcess), and unit "
-                f"'{_ONLY_ONES[key]}' has it already; give every unit a process of its own, run.workers: processes"
+                f"'{_ONLY_ONES[key]}' already uses it; run every unit in its own process (run.workers: processes)"
             )
         _ONLY_ONES[key] = self.name
         self._only = key
@@ -460,7 +460,7 @@ class FmuParticipant:
         try:
             self._call(lambda calls: calls.setup_experiment(self._start_s))
         except ParticipantError as error:
-            raise InputError(f"the FMU takes no experiment that begins at {self._start_s:g} s: {error}") from None
+            raise InputError(f"the FMU refuses an experiment that starts at {self._start_s:g} s: {error}") from None
 
     def _set_values(self, variables: Any, values: Parameters, what: str) -> None:
         declared = {variable.name: variable for variable in variables}
@@ -505,5 +505,5 @@ def _why_not(error: str, logged: str) -> str:
     if any(sign in error for sign in ("ELF", "file too short", "mach-o", "incompatible architecture")):
         return f"its library is damaged, or made for another machine: {error}; export the FMU for this platform"
     if "undefined symbol" in error or "symbol not found" in error:
-        return f"its library is incomplete: {error}; every function of FMI has to be there"
+        return f"its library is incomplete: {error}; it has to contain every function of FMI"
     return f"the FMU cannot be instantiated: {error} {logged}".rstrip()

@@ -167,7 +167,8 @@ def _check_items(types: Mapping[str, Any]) -> None:
                 int(item.value)
             except (TypeError, ValueError):
                 raise InputError(
-                    f"the item '{shortened(str(item.name))}' of its type '{shortened(str(name))}' has no whole number"
+                    f"the item '{shortened(str(item.name))}' of its type '{shortened(str(name))}' has a "
+                    "value that is not a whole number"
                 ) from None
 
 
@@ -188,7 +189,7 @@ def _version(root: Any) -> str:
     for kind, words in (("ModelExchange", "model exchange"), ("ScheduledExecution", "scheduled execution")):
         if root.find(kind) is not None:
             raise InputError(
-                f"an FMU for {words} only, which leaves solving to others; export it for co-simulation (CoSimulation)"
+                f"an FMU for {words} only, which has no solver of its own; export it for co-simulation (CoSimulation)"
             )
     raise InputError("an FMU that is not for co-simulation (it has no CoSimulation); export it for co-simulation")
 
@@ -222,7 +223,7 @@ def _variable(element: Any, types: Mapping[str, Any]) -> Variable:
         if kind is None:
             raise InputError(
                 f"its variable '{shortened(str(element.get('name')))}' is of the type '{shortened(declared)}', which "
-                "it lacks"
+                "it does not define"
             )
         unit = unit or kind.unit
         relative = value.get("relativeQuantity", "true" if kind.relativeQuantity else "false") in _TRUE
@@ -269,7 +270,7 @@ def _check(variables: Sequence[Variable]) -> None:
         for variable in variables:
             if variable.name in seen:
                 raise InputError(
-                    f"two of its variables are named '{shortened(variable.name)}'; export it with names of their own"
+                    f"two of its variables are named '{shortened(variable.name)}'; export it with unique names"
                 )
             seen.add(variable.name)
     if None in names or "" in names:

@@ -1,4 +1,4 @@
-"""What a participant needs of a model description, kept for the next time where reading that takes long.
+"""The part of a model description that a participant needs, cached where reading the description takes long.
 
 A heart's description of FMI 2.0 has up to 60 000 scalars in 10 MB, which make a dozen fields. What was made of them is
 kept in the user's cache under a hash of the FMU's file, whoever's FMU it is, and of the code that made it: another FMU

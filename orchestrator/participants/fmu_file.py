@@ -53,14 +53,14 @@ class FmuFile:
         if self._is_folder:
             path = self._path / DESCRIPTION
             if not path.is_file():
-                raise InputError(f"this folder has no {DESCRIPTION}, so it is no FMU")
+                raise InputError(f"this folder has no {DESCRIPTION}, so it is not an FMU")
             if path.stat().st_size > LARGEST_MEMBER:
                 raise InputError(f"{DESCRIPTION} has more than {LARGEST_MEMBER} bytes")
             content = path.read_bytes()
         else:
             with open_archive(self._path) as archive:
                 if DESCRIPTION not in archive:
-                    raise InputError(f"this archive has no {DESCRIPTION}, so it is no FMU")
+                    raise InputError(f"this archive has no {DESCRIPTION}, so it is not an FMU")
                 content = archive.read(DESCRIPTION)
         with _naming_description():
             return parse_document(content)
@@ -89,21 +89,21 @@ def check_binary(names: Collection[str], description: Any) -> None:
     """InputError if the FMU of the files `names` has no library for this machine; it says for which ones it has."""
     identifier = description.coSimulation.modelIdentifier
     if not identifier:
-        raise InputError("its CoSimulation has no modelIdentifier, which names the library; export it anew")
+        raise InputError("its CoSimulation has no modelIdentifier, which names the library; export it again")
     machine = fmpy.platform if description.fmiVersion == "2.0" else fmpy.platform_tuple
     library = f"binaries/{machine}/{identifier}{fmpy.sharedLibraryExtension}"
     if library in names:
         return
     machines = sorted({name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1})
     if machine in machines:
-        raise InputError(f"it has no {library}, which its modelIdentifier says is its library; export it anew")
+        raise InputError(f"it has no {library}, the library that its modelIdentifier names; export it again")
     if machines:
         raise InputError(
-            f"it has no library for this platform, {machine}, only for {', '.join(machines)}; export it anew"
+            f"it has no library for this platform, {machine}, only for {', '.join(machines)}; export it again"
         )
     if any(name.startswith("sources/") for name in names):
         raise InputError(f"it has source code only, and no library for this platform, {machine}; compile it first")
-    raise InputError(f"it has no library for this platform, {machine}, nor for any other; export it anew")
+    raise InputError(f"it has no library for this platform, {machine}, nor for any other; export it again")
 
 
 def packed(path: Path) -> bytes:

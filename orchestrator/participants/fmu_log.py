@@ -53,7 +53,7 @@ class FmuLog:
 
     @contextmanager
     def aside(self) -> Iterator[None]:
-        """What is logged in here is not what the call failed by: a question that an FMU need not answer."""
+        """Messages logged inside are not taken for the reason of a failure: an FMU may refuse this call."""
         before = list(self.errors), list(self.reasons), self.blames_input
         try:
             yield

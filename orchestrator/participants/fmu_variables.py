@@ -158,7 +158,7 @@ def check_parameters(parameters: Parameters, variables: Sequence[Any]) -> None:
 
 
 def check_start(start: Parameters, variables: Iterable[Any]) -> None:
-    """InputError for a start value that the FMU's variable cannot have, or that is none to be given.
+    """InputError for a start value that the FMU's variable cannot have, or of a variable that takes none.
 
     Start values are those of inputs, and of outputs and locals whose initial value is exact or approximate.
     """

@@ -1,4 +1,4 @@
-"""The one door to the units' floor: meshes, declarations, and units as participants without FMI."""
+"""The only module that imports units: meshes, declarations, and units as participants without FMI."""
 
 from collections.abc import Collection, Mapping, Sequence
 from math import inf, nan
@@ -199,7 +199,7 @@ def is_memoryless(unit: str) -> bool:
 def stability_theory(name: str) -> Theory:
     """The theory of stability called so; InputError if there is none."""
     if name not in THEORIES:
-        raise InputError(f"there is no theory '{name}'{did_you_mean(name, THEORIES)}")
+        raise InputError(f"unknown theory '{name}'{did_you_mean(name, THEORIES)}")
     return THEORIES[name]
 
 
@@ -210,7 +210,7 @@ def unit_setting(unit: str, parameters: Parameters) -> Setting:
 
 
 def amplification(theory: Theory, coupled: Coupled) -> float:
-    """What `theory` says by which factor disturbances grow from one step to the next; NaN where it comes to no result.
+    """The factor by which disturbances grow from step to step according to `theory`; NaN where it has no result.
 
     InputError where the theory does not fit the system.
     """

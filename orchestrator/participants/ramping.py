@@ -8,7 +8,7 @@ from .participant import Ports, Ramp, Values
 
 
 class Ramps:
-    """Those of the next step until it starts, and after it what the inputs have run to.
+    """The ramps of the next step until it starts, and after it the values that the inputs have reached.
 
     A unit keeps the value that an input had at a step's begin; what is recorded of it is the one at the step's end.
     """
@@ -22,7 +22,7 @@ class Ramps:
         self._next[name] = ramp
 
     def forget(self, name: str | None = None) -> None:
-        """The input `name` was set to what it is, or all were."""
+        """The input `name` was set to a constant value, or all inputs were."""
         if name is None:
             self._ends.clear()
         else:

@@ -1,4 +1,4 @@
-"""What a time series has of the participants: what they were asked to observe, or else what is worth a column."""
+"""The columns of a time series: the variables that were asked for, or else those that are worth a column."""
 
 from collections.abc import Mapping
 

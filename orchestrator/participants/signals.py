@@ -61,27 +61,27 @@ def read_table(path: Path) -> Table:
     except OSError as error:
         raise InputError(f"it cannot be read ({error.strerror})") from None
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"it is no CSV file in UTF-8 ({error})") from None
+        raise InputError(f"it is not a CSV file in UTF-8 ({error})") from None
     if len(rows) < 2:
-        raise InputError("it has no values; give a line of names, time_ms first, and a line for every time")
+        raise InputError("it has no values; write a line of names that begins with time_ms, and a line for every time")
     names = [cell.strip() for cell in rows[0]]
     if names[0] not in _TIMES:
         raise InputError(f"the first column is '{names[0][:80]}'; it has to be time_ms, or time, in s")
     for name in names:
         if not name or names.count(name) > 1:
-            what = f"'{name[:80]}' stands twice" if name else "without a name"
-            raise InputError(f"there is a column {what}; give every column a name of its own")
+            what = f"'{name[:80]}' occurs twice" if name else "without a name"
+            raise InputError(f"there is a column {what}; give every column a unique name")
     for line, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
-            raise InputError(f"row {line} has {len(row)} cells, where there are {len(names)} columns")
+            raise InputError(f"row {line} has {len(row)} cells, but there are {len(names)} columns")
     cells = dict(zip(names, zip(*rows[1:], strict=True), strict=True))
     times = _numbers(names[0], cells.pop(names[0])) / _TIMES[names[0]]
     for line, (one, other) in enumerate(pairwise(times), start=3):
         if other < one:
-            raise InputError(f"row {line}: the times go back, from {one:.12g} to {other:.12g} s; sort the rows")
+            raise InputError(f"row {line}: the time decreases from {one:.12g} to {other:.12g} s; sort the rows")
     for line, (one, _, other) in enumerate(zip(times, times[1:], times[2:], strict=False), start=4):
         if one == other:
-            raise InputError(f"row {line}: three rows have the time {one:.12g} s; a jump is two of them")
+            raise InputError(f"row {line}: three rows have the time {one:.12g} s; write a jump as two rows")
     return Table(times, cells)
 
 
@@ -153,7 +153,7 @@ def _cell(column: str, row: int, cell: str, parse: Callable[[str], _Value | None
     except (ValueError, OverflowError):
         value = None
     if value is None:
-        raise InputError(f"column '{column}', row {row}: '{cell[:80]}' is no value that the input can have")
+        raise InputError(f"column '{column}', row {row}: '{cell[:80]}' is not a valid value of the input")
     return value
 
 

@@ -199,12 +199,12 @@ class RemoteParticipant:
             if self._limit_s is None:
                 raise self._lost() from error
             raise ParticipantLost(
-                f"it did not come back within {self._limit_s:g} s (run.unit_time_limit_s); "
-                "raise the limit if that is no sign of a hang"
+                f"it did not return within {self._limit_s:g} s (run.unit_time_limit_s); "
+                "raise the limit if its steps can take that long"
             ) from error
         except (RuntimeError, OSError) as error:
             raise self._lost() from error
 
     @staticmethod
     def _lost() -> ParticipantLost:
-        return ParticipantLost("the process it worked in is gone; what it wrote last may say why")
+        return ParticipantLost("its process ended unexpectedly; its last output may say why")

@@ -21,7 +21,7 @@ from .names import CHECKPOINT
 from .origin import Origin
 
 _FORMAT = 3
-_REMEDY = "run without --resume to begin anew"
+_REMEDY = "run without --resume to start again"
 
 #: What a run goes on from: by part, what that kept.
 Memories = Mapping[str, Any]
@@ -64,7 +64,7 @@ class Checkpoint:
             return False
 
     def remove(self) -> None:
-        """Nothing is to be gone on from."""
+        """Remove the checkpoint: the run is not to be continued."""
         self._path.unlink(missing_ok=True)
 
 
@@ -81,19 +81,19 @@ def read_checkpoint(folder: Path, origin: Origin) -> Memories | None:
             before = Origin.from_content(json.loads(file["origin"][()]))
             index = json.loads(file["index"][()])
             if not isinstance(index, dict):
-                raise ValueError("it has no memories")
+                raise ValueError("it holds no state of the run")
             memories = _loaded(index, file["values"][()].tobytes())
     except FileNotFoundError:
         return None
     # What h5py raises of a file that lacks something, and what an operating system does not read.
     except (OSError, KeyError, ValueError, TypeError, AttributeError) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"{path}: no checkpoint to go on from ({why}); {_REMEDY}") from None
+        raise InputError(f"{path}: the checkpoint cannot be used ({why}); {_REMEDY}") from None
     changed = origin.changed_keys(before)
     if changed:
         raise InputError(
-            f"{path}: the checkpoint is of another scenario; {', '.join(changed)} changed since. "
-            "Undo that, or run without --resume"
+            f"{path}: the checkpoint belongs to another scenario; {', '.join(changed)} changed since. "
+            "Undo these changes, or run without --resume"
         )
     for change in origin.changes(before):
         raise InputError(f"{path}: {change}, or {_REMEDY}")

@@ -30,7 +30,7 @@ _EVENTS = "_time_ms"
 
 @dataclass(frozen=True)
 class Difference:
-    """`value` in the measure's unit: infinite where only one of the runs has the quantity, NaN where none can be told.
+    """`value` in the measure's unit: infinite where only one run has the quantity, NaN where none can be determined.
 
     `why` says so in words, for both. `time_ms` is when the difference is that large, where it is of a moment.
     """
@@ -51,7 +51,7 @@ class Measure:
 
 
 def measures(run: StoredRun, still: bool = False) -> dict[str, Measure]:
-    """All measures that `run` has, by name; with `still` also those of what never changes in it.
+    """All measures that `run` has, by name; with `still` also those of quantities that never change.
 
     `activation_ms` is the largest difference of the activation at any probe. Every column of numbers in the time
     series gives the largest difference at any time, and every field that moves the root mean square over its nodes or
@@ -98,7 +98,7 @@ def _activation(run: StoredRun, reference: StoredRun) -> Difference:
     for probe, time in theirs.items():
         own = ours.get(probe)
         if (own is None) != (time is None):
-            which = "never" if own is None else "activated, which it is not in the reference"
+            which = "never" if own is None else "activated, but not in the reference"
             return Difference(inf, f"the probe {probe} is {which}{' activated' if own is None else ''}")
         if own is not None and time is not None:
             apart.append(abs(own - time))
@@ -107,12 +107,12 @@ def _activation(run: StoredRun, reference: StoredRun) -> Difference:
 
 def _curve(column: str, run: StoredRun, reference: StoredRun) -> Difference:
     if column not in run.columns:
-        return Difference(nan, f"there is no {column}")
+        return Difference(nan, f"the run has no {column}")
     here, there = _common(run.columns["time_ms"], reference.columns["time_ms"])
     apart = np.abs(run.columns[column][here] - reference.columns[column][there])
     # Units that step less often leave gaps.
     if not np.isfinite(apart).any():
-        return Difference(nan, f"{column} has no time in common")
+        return Difference(nan, f"the runs have no time in common for {column}")
     row = int(np.argmax(np.where(np.isfinite(apart), apart, -inf)))
     return Difference(float(apart[row]), time_ms=float(reference.columns["time_ms"][there[row]]))
 
@@ -127,7 +127,7 @@ def _field(name: str, run: StoredRun, reference: StoredRun) -> Difference:
         difference = _part(run, name, own, count) - _part(reference, name, other, count)
         apart.append(float(np.sqrt((difference * difference).sum() / count)))
     if not apart:
-        return Difference(nan, f"{name} has no time in common")
+        return Difference(nan, f"the runs have no time in common for {name}")
     frame = int(np.argmax(apart))
     return Difference(apart[frame], time_ms=float(reference.frames_ms[there[frame]]))
 
@@ -136,12 +136,12 @@ def _events(name: str, run: StoredRun, reference: StoredRun) -> Difference:
     count, why = _shared(name, run, reference)
     here, there = _common(run.frames_ms, reference.frames_ms)
     if why or not len(here):
-        return Difference(nan, why or f"{name} has no time in common")
+        return Difference(nan, why or f"the runs have no time in common for {name}")
     ours, theirs = _part(run, name, int(here[-1]), count), _part(reference, name, int(there[-1]), count)
     happened = (ours >= 0.0) & (theirs >= 0.0)
     alone = int(((ours >= 0.0) != (theirs >= 0.0)).sum())
     if alone:
-        return Difference(inf, f"{alone} of {count} places have a time in one of the runs only")
+        return Difference(inf, f"{alone} of {count} places have a time in only one of the runs")
     apart = (ours - theirs)[happened]
     return Difference(float(np.sqrt((apart * apart).mean())) if len(apart) else 0.0)
 
@@ -152,9 +152,9 @@ def _shared(name: str, run: StoredRun, reference: StoredRun) -> tuple[int, str]:
     Nodes of a mesh that was refined from another begin with those of the other one.
     """
     if name not in run.moving or name not in reference.moving:
-        return 0, f"there is no {name}"
+        return 0, f"one of the runs has no {name}"
     if not len(run.frames_ms) or not len(reference.frames_ms):
-        return 0, f"there are no frames of {name}"
+        return 0, f"one of the runs has no frames of {name}"
     own, other = run.points_mm, reference.points_mm
     sizes = [len(_part(each, name, 0)) for each in (run, reference)]
     if own is not None and other is not None:
@@ -162,7 +162,7 @@ def _shared(name: str, run: StoredRun, reference: StoredRun) -> tuple[int, str]:
         nested = np.allclose(own[:shared], other[:shared], rtol=0.0, atol=1e-9)
         if nested and (sizes[0] == sizes[1] or sizes == [len(own), len(other)]):
             return min(sizes), ""
-    return 0, f"{name} is on another mesh, so that only probes and curves can be compared"
+    return 0, f"{name} is on another mesh, so only probes and curves can be compared"
 
 
 def _part(run: StoredRun, name: str, frame: int, count: int | None = None) -> Values:
@@ -186,7 +186,7 @@ def _common(one: Values, other: Values) -> tuple[NDArray[np.intp], NDArray[np.in
 
 
 def headlines(run: StoredRun) -> dict[str, float]:
-    """What a run is asked for in numbers, by name: activation at the probes, smallest volumes, ejection fractions.
+    """The headline numbers of a run, by name: activation at the probes, smallest volumes, ejection fractions.
 
     Of every other number in the time series it is the value farthest from that at the start. Probes that are not
     activated are left out.

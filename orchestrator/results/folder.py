@@ -25,6 +25,7 @@ from .names import (
     FMU_LOG,
     GROWING,
     ITERATIONS,
+    PAGE,
     PARTS,
     SUMMARY,
     TIME_SERIES,
@@ -40,7 +41,7 @@ from .whole import reserve, unfinished
 #: Space in bytes that is kept for the summary: a run that ends because the disk is full is to say so.
 _RESERVE = 16384
 
-_REMEDY = "run without --resume to begin anew"
+_REMEDY = "run without --resume to start again"
 
 
 class ResultsFolder:
@@ -78,11 +79,13 @@ class ResultsFolder:
         try:
             before = Origin.from_content(content)
         except ValueError:
-            raise InputError(f"{path}: this run is complete, but of another version; {_REMEDY}") from None
+            raise InputError(f"{path}: this run is complete, but was made by another version; {_REMEDY}") from None
         for change in self._origin.changes(before):
             raise InputError(f"{path}: this run is complete, but {change}, or {_REMEDY}")
         if not is_summary(content) or not self._holds(content["steps"]):
-            raise InputError(f"{path}: this run is complete, but not all of its results are as it left them; {_REMEDY}")
+            raise InputError(
+                f"{path}: this run is complete, but some of its results were changed afterwards; {_REMEDY}"
+            )
         with allowed(self.path, "--output"):
             self._remove_leftovers()
             (self.path / CHECKPOINT).unlink(missing_ok=True)
@@ -95,11 +98,11 @@ class ResultsFolder:
 
     @contextmanager
     def fitting(self) -> Iterator[None]:
-        """Inside, what a checkpoint says is put to use: whatever does not fit is an InputError."""
+        """For code that uses a checkpoint: content that does not fit becomes an InputError."""
         try:
             yield
         except DamagedFile as error:
-            raise InputError(f"{error.filename}: it is not as the run left it; {_REMEDY}") from None
+            raise InputError(f"{error.filename}: it was changed after the run wrote it; {_REMEDY}") from None
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             raise InputError(
                 f"{self.path / CHECKPOINT}: the checkpoint does not fit this run ({type(error).__name__}: {error}); "
@@ -139,7 +142,7 @@ class ResultsFolder:
         implementations: Mapping[str, Implementation],
     ) -> Recording:
         # First what would let the rest pass for the result of an earlier run.
-        for name in (SUMMARY, *BUDGET):
+        for name in (SUMMARY, PAGE, *BUDGET):
             remove_stale(self.path / name)
         if before is None:
             remove_stale(self.path / CHECKPOINT)

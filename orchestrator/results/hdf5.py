@@ -153,7 +153,7 @@ class _Sink:
         return size
 
     def read(self, size: int = -1) -> bytes:
-        """By this HDF5's binding tells a file from a path."""
+        """Present because h5py recognises a file by it."""
         return self._raw.read(size) or b""
 
     def readinto(self, buffer: memoryview) -> int:
@@ -168,4 +168,4 @@ class _Sink:
         return self._raw.tell()
 
     def flush(self) -> None:
-        """Nothing is held back."""
+        """Does nothing, because nothing is buffered."""

@@ -1,7 +1,7 @@
-"""What the units computed with: in the summary, told once where it is slower than it need be, and kept for a resume.
+"""The implementations (kernels, solvers) of the units: for the summary, for a note if slow, and for a resume.
 
-Kernels, instruction sets and linear solvers round differently. A run that goes on with others than those it began with
-would be neither of the two runs; like one with other packages it is refused.
+Kernels, instruction sets and linear solvers round differently. A run that continued with others than it started with
+would give the numbers of neither; like a run with other packages it is refused.
 """
 
 import logging
@@ -23,7 +23,7 @@ def implementations(participants: Mapping[str, Participant]) -> dict[str, Implem
         try:
             found[name] = participant.implementation()
         except ParticipantError as error:
-            raise RunError(f"unit '{name}' does not say what it computes with: {error}") from error
+            raise RunError(f"unit '{name}' cannot report its implementation (kernels, solvers): {error}") from error
         if found[name].text:
             _LOG.info("%s computes with %s", name, found[name].text)
     return found
@@ -48,10 +48,10 @@ def check(before: Mapping[str, NDArray[np.str_]], found: Mapping[str, Implementa
     """InputError where a unit computes with something else than what the `memory` of an earlier process has."""
     now = texts(found)
     for name in sorted({*before, *now}):
-        earlier = str(before[name]) if name in before else "something that it did not say"
+        earlier = str(before[name]) if name in before else "an implementation not reported"
         if earlier != now.get(name, ""):
             raise InputError(
-                f"unit '{name}' computed with {earlier} and computes with {now.get(name) or 'something else'} here; "
-                "results differ between them in their last digits. Go on where it computes with the same, or run "
-                "without --resume to begin anew"
+                f"unit '{name}' computed with {earlier} and computes with {now.get(name) or 'one not reported'} here; "
+                "results differ between them in their last digits. Continue where the implementation is the same, or "
+                "run without --resume to start again"
             )

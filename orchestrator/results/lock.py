@@ -34,7 +34,7 @@ class FolderLock:
             self._descriptor = self._acquire()
 
     def release(self) -> None:
-        """Give the folder away, and remove it if it is as empty as it was made."""
+        """Release the folder, and remove it if it is still empty."""
         with suppress(OSError):
             # Somebody may have removed the folder, and another run have made it again.
             if self._is_in_place(self._descriptor):
@@ -69,7 +69,7 @@ class FolderLock:
                 os.close(descriptor)
                 raise
             os.close(descriptor)
-        raise FileNotFoundError(2, "it vanishes again and again", str(self._folder))
+        raise FileNotFoundError(2, "it is removed again and again", str(self._folder))
 
     def _make_folder(self) -> None:
         missing = [folder for folder in (self._folder, *self._folder.parents) if not os.path.lexists(folder)]

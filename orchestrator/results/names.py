@@ -7,6 +7,8 @@ PROFILE = "profile.json"
 FIELDS = "fields.h5"
 XDMF = "fields.xdmf"
 SUMMARY = "summary.json"
+#: What people look at, made from all others.
+PAGE = "report.html"
 #: Only where an FMU logs something.
 FMU_LOG = "fmu.log"
 

@@ -73,22 +73,24 @@ class Origin:
         return {"versions": dict(self.versions), "fingerprints": prints, "scenario": dict(self.scenario)}
 
     def changed_keys(self, earlier: "Origin") -> list[str]:
-        """The keys of the scenario that were others."""
+        """The keys of the scenario that had other values."""
         return differences(earlier.scenario, self.scenario)
 
     def changes(self, earlier: "Origin") -> list[str]:
-        """What of the rest was another, in words, each with what undoes it."""
+        """What else differs, in words, each with its remedy."""
         found = []
         for name in sorted({*earlier.files, *self.files}):
             if earlier.files.get(name) != self.files.get(name):
                 gone = self.files.get(name) is None
-                found.append(f"{name} {'is gone' if gone else 'has changed since'}; restore it")
+                found.append(f"{name} {'is missing' if gone else 'has changed since'}; restore it")
         for name in sorted({*earlier.versions, *self.versions}):
             before, now = earlier.versions.get(name), self.versions.get(name)
             if before is None or now is None or _counted(name, before) != _counted(name, now):
-                found.append(f"{name} was {before or 'not used'} and is {now or 'not used'}; install what it was")
+                found.append(
+                    f"{name} was {before or 'not used'} and is {now or 'not used'}; install the former version"
+                )
         if earlier.program != self.program and not found:
-            found.append("this program has changed since; take the version that began the run")
+            found.append("this program has changed since; use the version that started the run")
         return found
 
 

@@ -13,6 +13,7 @@ from ..costs import Costs
 from ..coupling.exchange import Exchange
 from ..coupling.master import Accepted
 from ..errors import InputError, Interrupted, RunError, Terminated
+from ..omissions import omissions
 from ..participants.participant import Implementation
 from . import implementation
 from .appended import check
@@ -115,7 +116,7 @@ class Recording:
 
     @staticmethod
     def check(folder: Path, before: Memories) -> None:
-        """Whether all is there that `before` goes on from; DamagedFile if not. Nothing is touched."""
+        """Raise DamagedFile unless all files that `before` continues from are complete. Nothing is changed."""
         check(folder / TIME_SERIES, before["series"])
         check(folder / COUPLING, before["log"]["table"])
         stretches(before["log"])
@@ -169,6 +170,7 @@ class Recording:
             "resumable": resumable,
             "warnings": [*self._assembly.warnings, *slower, *self.diagnosis],
             "implementation": implementation.texts(self._implementations),
+            "not_modelled": omissions(self._assembly.participants, self._assembly.connections),
             **self._request.content(),
         }
         scenario, costs = self._assembly.scenario, self._costs.content()
@@ -227,8 +229,8 @@ class Recording:
         rows = self._series.rows
         reached = f". The results up to {rows[-1][0]:g} ms are complete" if rows else ""
         refused = RunError(
-            f"the results cannot be written ({_told(error)}){reached}; make room, or give back what was taken away, "
-            "and go on with --resume"
+            f"the results cannot be written ({_told(error)}){reached}; free space or restore what is missing, "
+            "and continue with --resume"
         )
         refused.kind, refused.time_ms = "results", float(rows[-1][0]) if rows else None
         return refused

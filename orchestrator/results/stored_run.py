@@ -161,8 +161,12 @@ class StoredRun:
         """A changing field in a frame, shape (nodes or elements, ...); None if there is none."""
         return self._read(f"frames/{name}", number)
 
-    def _read(self, name: str, row: int | None = None) -> Values | None:
-        """A data set or one row of it. Where units share a name, `unit.name` of the first unit is read."""
+    def frames(self, name: str, every: int = 1) -> Values | None:
+        """A changing field in every so-many-th frame, shape (frames, nodes or elements, ...); None if there is none."""
+        return self._read(f"frames/{name}", slice(None, None, every))
+
+    def _read(self, name: str, row: int | slice | None = None) -> Values | None:
+        """A data set or rows of it. Where units share a name, `unit.name` of the first unit is read."""
         if not self._fields.exists():
             return None
         with h5py.File(self._fields, "r") as file:
@@ -171,7 +175,7 @@ class StoredRun:
                 return None
             within = file[group] if group else file
             found = [key for key in within if key == last or key.endswith(f".{last}")]
-            if not found or (row is not None and row >= len(within[found[0]])):
+            if not found or (isinstance(row, int) and row >= len(within[found[0]])):
                 return None
             values = within[found[0]]
             return np.asarray(values[:] if row is None else values[row])

@@ -81,7 +81,7 @@ def write_summary(
 
 
 def is_summary(content: Mapping[str, Any]) -> bool:
-    """Whether `content` has what whoever reads the summary of a run that is done relies on."""
+    """Whether `content` has all that readers of the summary of a finished run rely on."""
 
     def numbers(values: Iterable[Any]) -> bool:
         return all(isinstance(value, (int, float)) for value in values)

@@ -58,7 +58,9 @@ def file_content(path: Path, kind: str, needs: str, model: type[BaseModel]) -> d
     if content is None:
         raise InputError(f"{path}: the file is empty; a {kind} needs at least {needs}")
     if not isinstance(content, dict):
-        raise InputError(f"{path}: a {kind} is lines `key: value` with the keys {', '.join(model.model_fields)}")
+        raise InputError(
+            f"{path}: a {kind} consists of lines `key: value` with the keys {', '.join(model.model_fields)}"
+        )
     return content
 
 

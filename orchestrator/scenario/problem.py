@@ -37,7 +37,7 @@ def explained(problem: Mapping[str, Any], model: type[BaseModel]) -> str:
         )
     if kind == "string_pattern_mismatch":
         what = "choice" if context["pattern"] == WORKERS else "name"
-        return f"'{key}': {_short(given)} is no valid {what}; {_ALLOWED[context['pattern']]}"
+        return f"'{key}': {_short(given)} is not a valid {what}; {_ALLOWED[context['pattern']]}"
     if kind == "literal_error":
         return f"'{key}' is {_short(given)}: it should be {context['expected']}{_nearest(given, context['expected'])}"
     return f"'{key}' is {_short(given)}: {_expected(kind, given, problem)}"
@@ -59,7 +59,7 @@ def _expected(kind: str, given: Any, problem: Mapping[str, Any]) -> str:
         unit = "; its unit of measure is the one the key's name ends in" if isinstance(given, str) else ""
         return f"expected a number, written alone and without quotes{unit}"
     if kind == "none_required":
-        return "only null is possible yet; remove the key"
+        return "only null is supported so far; remove the key"
     message: str = problem["msg"]
     return message.replace("Input should be", "it should be")
 

@@ -1,6 +1,6 @@
 """`cosim show`: what a scenario builds, exchanges and solves, before anything runs; and what it does without."""
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 
 import numpy as np
@@ -10,9 +10,9 @@ from ..coupling.build import idle
 from ..coupling.connections import Connection
 from ..coupling.loops import groups_in_order
 from ..coupling.master import stepping_order
-from ..participants.driven import Driven
+from ..omissions import driven_inputs, omissions
 from ..participants.native import Mesh, element_quality
-from ..participants.participant import Participant, Port
+from ..participants.participant import Participant
 from ..scenario import Scenario
 
 #: 10–90 % width of a depolarising front in mm (docs/model.md, Numbers); elements longer than half of it are too coarse.
@@ -40,7 +40,7 @@ def describe(assembly: Assembly) -> str:
             *_exchange(scenario, participants, connections, order),
             *_held(scenario, participants, connections, order),
         ],
-        "not modelled": list(_absent(participants, connections)) or ["nothing is left out"],
+        "not modelled": omissions(participants, connections) or ["nothing is left out"],
         "warnings": [*assembly.warnings, *_warnings(scenario, mesh)] or ["none"],
     }
     lines = [scenario.name]
@@ -121,40 +121,10 @@ def _exchange(
         yield f"{unit}: {count} solves{saved}{why}"
 
 
-def _absent(participants: Mapping[str, Participant], connections: Sequence[Connection]) -> Iterator[str]:
-    fed = {(link.target.unit, link.target.name) for link in connections}
-    fed |= {(name, signal) for name, signals in _signals(participants).items() for signal in signals}
-    for name, participant in participants.items():
-        for port in participant.inputs.values():
-            if not port.live:
-                yield f"{name}.{port.name}: {port.needs} of the unit is 0, so it has no influence and is not connected"
-            elif (name, port.name) not in fed and not _fed_in_part(name, port, fed):
-                yield f"{name}.{port.name}: {_unfed(port, participants)}, so it keeps its start value"
-
-
-def _unfed(port: Port, participants: Mapping[str, Participant]) -> str:
-    """Why no output of its name feeds an input."""
-    for name, participant in participants.items():
-        output = participant.outputs.get(port.name)
-        if output is not None and not output.live:
-            return f"{output.needs} of {name}, which gives it, is 0"
-    return "no unit gives it"
-
-
-def _fed_in_part(unit: str, port: Port, fed: Set[tuple[str, str]]) -> bool:
-    """Whether single elements of an array are fed."""
-    return any(name == unit and element.startswith(f"{port.name}[") for name, element in fed)
-
-
 def _driven(scenario: Scenario, participants: Mapping[str, Participant]) -> Iterator[str]:
-    for name, signals in _signals(participants).items():
+    for name, signals in driven_inputs(participants).items():
         for signal in signals:
             yield f"{scenario.inputs.file if scenario.inputs else ''} -> {name}.{signal}"
-
-
-def _signals(participants: Mapping[str, Participant]) -> dict[str, list[str]]:
-    """The inputs of each unit that follow signals of a file."""
-    return {name: list(unit.signals) for name, unit in participants.items() if isinstance(unit, Driven)}
 
 
 def _warnings(scenario: Scenario, mesh: Mesh | None) -> Iterator[str]:

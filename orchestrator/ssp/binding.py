@@ -75,14 +75,17 @@ class _Sources:
         source, here = element.get("source"), next(named(element, inline), None)
         if (source is None) == (here is None):
             own = "ParameterSet" if schema == "ssv" else "ParameterMapping"
-            raise InputError(f"a parameter binding of {self._what} needs either a source or a {own} of its own")
+            raise InputError(f"a parameter binding of {self._what} needs either a source or its own {own}")
         if here is not None:
             check(here, schema, f"the {name} of {self._what}")
             return here, f"the {name} of {self._what}"
         where = shortened(unquote(source))
         if element.get("sourceBase", "SSD") != "SSD":
             if self._fmu is None:
-                raise InputError(f"the {name} of {self._what} is to be in an FMU, but it is none; put it beside it")
+                raise InputError(
+                    f"the {name} of {self._what} is declared to be inside an FMU (sourceBase), but does not belong to "
+                    "one; refer to a file of the package (sourceBase SSD)"
+                )
             return parsed(member(self._fmu, source, f"the {name} of {self._what}"), schema, where), where
         return read(inside(self._base, source, f"a {name} of {self._what}", self._package), schema, where), where
 
@@ -93,7 +96,7 @@ def _entry(parameter: Any, prefix: str, units: dict[str, Measure], where: str) -
     kind, unit = value.tag.partition("}")[2], value.get("unit")
     what = f"{where}: '{shortened(name)}'"
     if kind == "Binary":
-        raise InputError(f"{what} is of the type Binary, which scenarios have no words for; leave it out")
+        raise InputError(f"{what} is of the type Binary, which a scenario cannot express; leave it out")
     shape, texts = _shape(parameter, what), _texts(value, kind, what)
     if len(texts) != prod(shape):
         raise InputError(f"{what} has {len(texts)} values, but is {written(shape)}; correct its dimensions")
@@ -105,7 +108,7 @@ def _shape(parameter: Any, what: str) -> tuple[int, ...]:
     """The dimensions of a parameter, whose sizes have to be numbers (SSP 2.0, section on dimensions)."""
     dimensions = list(named(parameter, "ssc:Dimension"))
     if any(each.get("size") is None or each.get("sizeConnector") is not None for each in dimensions):
-        raise InputError(f"{what} has a dimension without a size of its own; a parameter set gives all sizes")
+        raise InputError(f"{what} has a dimension without its own size; a parameter set has to give all sizes")
     return tuple(int(each.get("size")) for each in dimensions)
 
 

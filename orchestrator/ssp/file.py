@@ -44,7 +44,7 @@ def unpack(path: Path, folder: Path) -> Any:
     try:
         with open_archive(path) as archive:
             if STRUCTURE not in archive:
-                raise InputError(f"there is no {STRUCTURE} in it, so it is no system package")
+                raise InputError(f"there is no {STRUCTURE} in it, so it is not a system package")
             archive.extract(folder)
     except InputError as error:
         raise InputError(f"cannot be unpacked as a system package: {error}") from None
@@ -77,7 +77,7 @@ def check(element: Any, kind: str, name: str) -> None:
     if not schema.validate(etree.ElementTree(element)):
         problem = schema.error_log[0]
         message = shortened(problem.message, _LONGEST_PROBLEM)
-        raise InputError(f"{name}, line {problem.line}: not as SSP {version} has it: {message}")
+        raise InputError(f"{name}, line {problem.line}: this does not follow the schema of SSP {version}: {message}")
 
 
 def _version(element: Any, name: str) -> str:

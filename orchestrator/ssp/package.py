@@ -112,7 +112,7 @@ def _times(root: Any, parts: Sequence[SystemComponent]) -> dict[str, Any]:
         return {"run": {}}
     stop_ms = _milliseconds(float(stop))
     if not 0.0 < stop_ms < inf:
-        raise InputError(f"the default experiment stops at {stop} s, before it has begun or never")
+        raise InputError(f"the default experiment stops at {stop} s; the stop time has to be finite and above 0")
     proposed = [step for part in parts if (step := _proposed_ms(part)) is not None]
     # What is more steps than anybody waits for is refused with the scenario, which names both.
     steps = ceil(min(stop_ms / min(proposed), 1e18) - 1e-9) if proposed else _STEPS
@@ -149,10 +149,10 @@ def _annotation(root: Any, folder: Path) -> dict[str, Any]:
                 raise ValueError(f"it has more than {_LONGEST_ANNOTATION} characters")
             kept = json.loads(text)
             if not isinstance(kept, dict) or not kept:
-                raise ValueError("it is no section")
+                raise ValueError("it is not a section")
             for key, value in kept.items():
                 if not isinstance(value, _KEPT.get(key, ())):
-                    raise ValueError(f"{quoted(key)} does not belong there, or is no section")
+                    raise ValueError(f"{quoted(key)} does not belong there, or is not a section")
             stop = next(named(root, "ssd:DefaultExperiment")).get("stopTime")
             # Another tool may have changed what the standard has a place for.
             if _milliseconds(float(stop)) != _milliseconds(kept["run"]["stop_ms"] / _MS_PER_S):
@@ -173,6 +173,6 @@ def _check_reach(kept: dict[str, Any], folder: Path) -> None:
     workers = kept["run"].get("workers")
     if isinstance(workers, str) and "://" in workers:
         raise InputError(
-            f"the annotation {ANNOTATION} sends the units to {shortened(workers)}; a package is not to choose other "
+            f"the annotation {ANNOTATION} sends the units to {shortened(workers)}; a package must not choose other "
             "machines: remove it there, and use --set run.workers=..."
         )

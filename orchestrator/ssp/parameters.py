@@ -82,7 +82,7 @@ class _Bound:
                     self._keep(wanted, self._passed(hop.source, hops[number:], wanted))
                     break
         for pin in self._at.keys() - used:
-            self._tell(f"the connector '{pin}' gives its parameter value to nobody; it is not used")
+            self._tell(f"the connector '{pin}' passes its parameter value to no component; it is not used")
 
     def _spread(self, node: SystemNode, name: str, entry: Entry) -> bool:
         """Give a value to all that has this hierarchical name in `node`; whether there is anything."""
@@ -160,14 +160,14 @@ def _element(text: str, entry: Entry, wanted: _Wanted) -> Any:
         return number
     if entry.law not in (None, Law()):
         raise InputError(
-            f"parameter '{shortened(entry.name)}' is of the type {entry.kind}, which no linear transformation is for"
+            f"parameter '{shortened(entry.name)}' is of the type {entry.kind}, which cannot be transformed linearly"
         )
     if entry.kind == "Enumeration":
         items = {name: number for number, name in wanted.part.variables[wanted.name].items.items()}
         if text not in items:
             raise InputError(
                 f"'{wanted.label}' has no item '{shortened(text)}'"
-                + (did_you_mean(text, items) if items else " (known: none, it is no enumeration)")
+                + (did_you_mean(text, items) if items else " (known: none, it is not an enumeration)")
             )
         return items[text]
     if entry.kind in WHOLE:

@@ -139,8 +139,7 @@ class _Growth:
             place = (*path, label)
             if kind == "Component" and part.get("source") is None:
                 raise InputError(
-                    f"component '{shortened('.'.join(place))}' has no source, so there is nothing of it to run; give "
-                    "it an FMU"
+                    f"component '{shortened('.'.join(place))}' has no source, so it cannot be run; give it an FMU"
                 )
             if kind == "System":
                 node.parts[label] = self.system(part, place, source)
@@ -161,7 +160,7 @@ class _Growth:
             else:
                 self._packages += 1
                 if self._packages > _DEEPEST:
-                    raise InputError(f"there are more than {_DEEPEST} packages in packages")
+                    raise InputError(f"there are more than {_DEEPEST} packages nested in one another")
                 base = self._package / f"package {self._packages} in it"
                 base.mkdir()
                 root = unpack(file, base)

@@ -107,7 +107,7 @@ class Wiring:
         while pin in self._feeding:
             hop = self._feeding[pin]
             if hop in hops:
-                raise InputError(f"the connections of {pin} lead in a circle, through connectors of systems only")
+                raise InputError(f"the connections of {pin} form a circle through connectors of systems only")
             hops.append(hop)
             pin = hop.source
         return hops[::-1]

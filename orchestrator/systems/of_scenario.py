@@ -28,7 +28,7 @@ def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[
     where elements of an array of FMI 3.0 are connected, which a system has no words for.
     """
     if scenario.inputs is not None:
-        raise InputError("inputs: a system has no place for signals of a file; remove `inputs`")
+        raise InputError("inputs: a system description cannot contain signals from a file; remove `inputs`")
     with ExitStack() as stack:
         participants = make_participants(stack, called_directly(scenario), base, mesh, described=True)
         connections = connect(participants, scenario.connections, scenario.connect_by_name)
@@ -37,7 +37,9 @@ def system_of(scenario: Scenario, base: Path, mesh: Mesh | None, built: Mapping[
     components = []
     for name, entry in scenario.units.items():
         if entry.fmu is not None and (base / entry.fmu).is_dir():
-            raise InputError(f"units.{name}.fmu: {entry.fmu} is a folder; pack it, for a system is made of files")
+            raise InputError(
+                f"units.{name}.fmu: {entry.fmu} is a folder; pack it as a file, because a system refers to files"
+            )
         ports = participants[name]
         component = Component(
             name,
@@ -67,9 +69,9 @@ def _check_whole(component: Component, split: Set[str]) -> None:
     for array in sorted(split & component.variables.keys()):
         if component.variables[array].dimensions:
             raise InputError(
-                f"connections: of the array {component.name}.{array} of FMI 3.0 single elements are connected, or it "
-                "is connected to one of another shape, which a system has no words for; connect whole arrays of one "
-                "shape, or take FMUs of FMI 2.0"
+                f"connections: single elements of the array {component.name}.{array} of FMI 3.0 are connected, or it "
+                "is connected to an array of another shape, which a system cannot express; connect whole arrays of "
+                "one shape, or take FMUs of FMI 2.0"
             )
 
 

@@ -164,8 +164,8 @@ class System:
         inputs = list(self.component(link.target).names(link.input, link.shape))
         if len(outputs) != len(inputs) or (outputs == [link.output]) != (inputs == [link.input]):
             raise InputError(
-                f"the connection {link} is of an array of FMI 3.0 at one end and of scalars at the other, which has no "
-                "place in a system; take FMUs of one version of FMI for both"
+                f"the connection {link} is of an array of FMI 3.0 at one end and of scalars at the other, which a "
+                "system cannot express; take FMUs of one version of FMI for both"
             )
         return zip(outputs, inputs, strict=True)
 

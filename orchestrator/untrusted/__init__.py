@@ -1,1 +1,1 @@
-"""Files of strangers: opened within bounds of size, depth and time, and never outside of the folder meant for them."""
+"""Other people's files: opened within bounds of size, depth and time, and never outside of their folder."""

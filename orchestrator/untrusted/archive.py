@@ -1,4 +1,4 @@
-"""The zip archives of strangers, FMUs and system packages: read and unpacked without leaving the folder.
+"""Other people's zip archives, FMUs and system packages: read and unpacked without leaving the folder.
 
 Sizes are bounded twice, as the archive declares them and as they turn out while a member is read, so that neither
 memory nor disk is filled by a small file that unpacks to gigabytes.
@@ -123,7 +123,9 @@ def open_archive(path: Path) -> Iterator[Archive]:
             raise InputError("no such file")
         archive = _looked_through(path)
     except _DAMAGE as error:
-        raise InputError(f"it is no zip archive, or a damaged one ({shortened(str(error))}); write it anew") from None
+        raise InputError(
+            f"it is not a zip archive, or it is damaged ({shortened(str(error))}); write it again"
+        ) from None
     except OSError as error:
         raise InputError(f"it cannot be read ({error.strerror or error})") from None
     try:
@@ -175,10 +177,10 @@ def _place(member: zipfile.ZipInfo) -> str:
     # What can be printed has no control characters; nearly all names can, and each is looked at many times.
     odd = not name.isprintable() and any(unicodedata.category(letter) == "Cc" for letter in name)
     if odd or not (parts or member.is_dir()):
-        raise InputError(f"its member {quoted(name)} has no name for a file; rename it")
+        raise InputError(f"its member {quoted(name)} has no valid file name; rename it")
     kind = stat.S_IFMT(member.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
-        what = "a link" if kind == stat.S_IFLNK else "no plain file"
+        what = "a link" if kind == stat.S_IFLNK else "not a plain file"
         raise InputError(f"its member {quoted(name)} is {what}; pack the file itself")
     return "/".join(parts)
 
@@ -193,7 +195,7 @@ def _check(members: list[zipfile.ZipInfo], size: int) -> None:
         content = member.is_dir(), member.file_size, member.CRC
         # Some tools write a folder, or a file, once for each other that it belongs to.
         if name and seen.get(name, content) != content:
-            raise InputError(f"its member {quoted(name)} stands twice in it, and differs; keep one of the two")
+            raise InputError(f"its member {quoted(name)} occurs twice with different content; keep one of the two")
         seen[name] = content
         if member.flag_bits & _ENCRYPTED:
             raise InputError(f"its member {quoted(name)} is encrypted; pack it without a password")
@@ -205,7 +207,7 @@ def _check(members: list[zipfile.ZipInfo], size: int) -> None:
         raise InputError(f"it unpacks to {_amount(total)}, more than {_amount(LARGEST_ARCHIVE)} are refused")
     if total > _HARMLESS and total > _LARGEST_RATIO * size:
         raise InputError(
-            f"it unpacks from {_amount(size)} to {_amount(total)}, as only archives do that are meant to fill a disk; "
+            f"it unpacks from {_amount(size)} to {_amount(total)}, as only archives meant to fill a disk do; "
             "leave out what is not needed"
         )
 
@@ -217,7 +219,7 @@ def _reading(name: str) -> Iterator[None]:
         yield
     except _DAMAGE as error:
         raise InputError(
-            f"its member {quoted(name)} is damaged ({shortened(str(error))}); write the archive anew"
+            f"its member {quoted(name)} is damaged ({shortened(str(error))}); write the archive again"
         ) from None
     except OSError as error:
         raise InputError(f"its member {quoted(name)} cannot be unpacked ({os.strerror(error.errno or 0)})") from None

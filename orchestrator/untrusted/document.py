@@ -1,4 +1,4 @@
-"""The XML of strangers: parsed without a document type, so that nothing in it expands, refers or is fetched."""
+"""Other people's XML: parsed without a document type, so that nothing in it expands, refers or is fetched."""
 
 from typing import Any
 from xml.parsers import expat
@@ -44,7 +44,7 @@ def parse_document(content: bytes) -> Any:
             raise InputError(
                 f"it is nested more than 256 deep, in line {error.lineno}; no file of FMI or SSP is"
             ) from None
-        raise InputError(f"it is no well-formed XML ({shortened(str(error), _LONGEST)})") from None
+        raise InputError(f"it is not well-formed XML ({shortened(str(error), _LONGEST)})") from None
     except MemoryError:
         raise InputError("it is too large for the memory; leave out what is not needed") from None
 
@@ -68,4 +68,4 @@ def _check_prolog(content: bytes) -> None:
         return
     # An unknown encoding is a LookupError; one that takes several bytes a character a ValueError.
     except (expat.ExpatError, LookupError, ValueError) as error:
-        raise InputError(f"it is no well-formed XML ({shortened(str(error), _LONGEST)})") from None
+        raise InputError(f"it is not well-formed XML ({shortened(str(error), _LONGEST)})") from None

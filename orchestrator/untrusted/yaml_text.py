@@ -1,4 +1,4 @@
-"""The YAML of strangers: read as plain values, of bounded size however often an alias repeats a part of it."""
+"""Other people's YAML: read as plain values, of bounded size however often an alias repeats a part of it."""
 
 import re
 import warnings
@@ -138,7 +138,7 @@ def _parts(node: Node) -> list[Node]:
         return list(node.value)
     if isinstance(node, ScalarNode):
         if _NO_TEXT.search(node.value):
-            raise _Refused(f"not a text: a character{_line(node)} is \\0, or half of one; remove it")
+            raise _Refused(f"not plain text: a character{_line(node)} is \\0 or half of a surrogate pair; remove it")
         if str(node.tag) != _TEXT_TAG and len(node.value) > _LONGEST_NUMBER:
             digits = sum(map(str.isalnum, node.value))
             raise _Refused(f"not valid YAML{_line(node)}: a number of {digits} digits; round it")

@@ -1,4 +1,4 @@
-"""The communication points of an experiment, and which of them its results are of."""
+"""The communication points of an experiment, and the rows of its results at them."""
 
 from dataclasses import dataclass
 
@@ -42,14 +42,14 @@ def communication(experiment: Experiment, times: NDArray[np.float64]) -> Communi
     else:
         points, sizes = _grid(start, stop, experiment.step_s)
     if not sizes.size:
-        raise Unverified(f"its results end where it begins, at {start:g} s")
+        raise Unverified(f"its results end at its start, at {start:g} s")
     rows: dict[int, int] = {}
     scale = float(sizes[0])
     for row, time in enumerate(times.tolist()):
         nearest = _nearest(points, time)
         if abs(points[nearest] - time) > _SAME * scale:
             raise Unverified(
-                f"the results have a row at {time:.12g} s, which is no communication point of the experiment (from "
+                f"the results have a row at {time:.12g} s, which is not a communication point of the experiment (from "
                 f"{start:g} to {stop:g} s in steps of {scale:g} s)"
             )
         if nearest in rows:
@@ -58,14 +58,14 @@ def communication(experiment: Experiment, times: NDArray[np.float64]) -> Communi
     if abs(times[0] - start) > _SAME * scale:
         raise Unverified(f"the results begin at {times[0]:.12g} s, and the experiment at {start:g} s")
     if experiment.step_s is None and times[-1] > stop + _SAME * scale:
-        raise Unverified(f"the results go on to {times[-1]:.12g} s, after the experiment's end at {stop:g} s")
+        raise Unverified(f"the results continue to {times[-1]:.12g} s, after the experiment's end at {stop:g} s")
     return Communication(points, sizes, rows, is_whole=bool(times[-1] >= stop - _SAME * scale))
 
 
 def _grid(start: float, stop: float, step: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     count = (stop - start) / step
     if count > _MOST_STEPS:
-        raise Unverified(f"its {count:.3g} steps are more than {_MOST_STEPS} that are run")
+        raise Unverified(f"its {count:.3g} steps are more than the {_MOST_STEPS} that are run at most")
     whole = round(count) if abs(count - round(count)) <= _SAME else int(count)
     points = [start + step * number for number in range(whole + 1)]
     sizes = [step] * whole

@@ -84,8 +84,8 @@ def read_experiments(
                 tell(f"the result {shortened(related.source)} belongs to none of the experiments; it is not compared")
     if not any(item.references for item in found):
         raise InputError(
-            f"{MANIFEST_PATH}: it tells of no experiment with results that can be read, so there is nothing to verify "
-            f"the FMU by; results are tables ({_TABLE}), and experiments are of the type {EXPERIMENT_TYPES[0]}"
+            f"{MANIFEST_PATH}: it names no experiment with results that can be read, so the FMU cannot be "
+            f"verified; results are tables ({_TABLE}), and experiments are of the type {EXPERIMENT_TYPES[0]}"
         )
     return found
 
@@ -109,7 +109,7 @@ class _Reader:
             tell(f"the experiment {where} is of the type {shortened(related.type)}, which is not read; it is left out")
             return []
         if related.role == _UNCERTAINTY:
-            tell(f"the experiment {where} is for the analysis of uncertainty and no verification; it is left out")
+            tell(f"the experiment {where} is for the analysis of uncertainty, not for verification; it is left out")
             return []
         name = self._files.refer(related.source, MANIFEST_PATH, "a file of experiments")
         try:
@@ -118,8 +118,8 @@ class _Reader:
             raise InputError(f"{name}: {error}") from None
         if root.tag != "Experiments":
             raise InputError(
-                f"{name}: its root is {shortened(str(root.tag))}, and that of a file of experiments is Experiments, "
-                "without a namespace; another format is not read"
+                f"{name}: its root is {shortened(str(root.tag))}, but a file of experiments has the root Experiments "
+                "without a namespace; other formats are not read"
             )
         check_experiments(root, name)
         return [self.experiment(element, name) for element in root.iterfind("Experiment")]

@@ -49,8 +49,8 @@ def read_manifest(files: ReferenceFiles) -> Manifest:
     """The manifest in an FMU; InputError where there is none, and for what is wrong with it."""
     if MANIFEST_PATH not in files.names:
         raise InputError(
-            f"there are no reference experiments in it (no {MANIFEST_PATH}, FMI-LS-REF), so there is nothing to verify "
-            "it by; take an FMU that has some, as `cosim build` makes them"
+            f"there are no reference experiments in it (no {MANIFEST_PATH}, FMI-LS-REF), so it cannot be "
+            "verified; take an FMU that has some, such as those that `cosim build` makes"
         )
     try:
         root = parse_document(files.read(MANIFEST_PATH))
@@ -58,7 +58,7 @@ def read_manifest(files: ReferenceFiles) -> Manifest:
         raise InputError(f"{MANIFEST_PATH}: {error}") from None
     if root.tag != "fmiReferences" or root.get(_NAME) != STANDARD:
         raise InputError(
-            f"{MANIFEST_PATH}: it is no manifest of {STANDARD}: its root is {shortened(str(root.tag))}, its "
+            f"{MANIFEST_PATH}: it is not a manifest of {STANDARD}: its root is {shortened(str(root.tag))}, its "
             f"fmi-ls-name {shortened(root.get(_NAME, 'not given'))}"
         )
     experiments = tuple(root.iterfind("Experiment"))

@@ -1,4 +1,4 @@
-"""What came of verifying an FMU: a verdict for every variable of every experiment."""
+"""The outcome of verifying an FMU: a verdict for every variable of every experiment."""
 
 from dataclasses import dataclass
 from enum import Enum

@@ -28,7 +28,7 @@ def read_parameter_set(
     root = parse_document(content)
     namespace, _, name = str(root.tag).rpartition("}")
     if name != "ParameterSet" or namespace != f"{{{_NAMESPACE}":
-        raise InputError(f"its root is {shortened(str(root.tag))}, and that of a parameter set (SSV) is ParameterSet")
+        raise InputError(f"its root is {shortened(str(root.tag))}, but a parameter set (SSV) has the root ParameterSet")
     if root.get("version") not in ("1.0", "2.0"):
         raise InputError(f"it is of version {quoted(root.get('version'))}; versions 1.0 and 2.0 are read")
     variables = {variable.name: variable for variable in description.modelVariables}

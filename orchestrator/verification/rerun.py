@@ -51,7 +51,7 @@ class _Run:
             self._participant.complete()
             self._read(0)
         except (ParticipantError, InputError) as error:
-            raise Unverified(f"the FMU failed in its initialization at {begin:g} s: {error}") from None
+            raise Unverified(f"the FMU failed during initialization at {begin:g} s: {error}") from None
 
     def step(self, point: int) -> bool:
         """Take the step from the communication point of this number, and read what it leads to; whether to go on."""
@@ -65,7 +65,7 @@ class _Run:
         except ParticipantError as error:
             raise Unverified(f"the FMU failed in the step from {begin:g} to {begin + size:g} s: {error}") from None
         if point + 1 > self._last and not self._communication.is_whole:
-            raise Unverified(f"the results end at {begin:g} s, and the experiment goes on from there")
+            raise Unverified(f"the results end at {begin:g} s, but the experiment continues")
         self._read(point + 1)
         return True
 

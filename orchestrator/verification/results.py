@@ -23,14 +23,14 @@ def read_results(content: bytes, name: str) -> ValueTable:
     try:
         table = read_values(content)
     except InputError as error:
-        raise Unverified(f"the results in {name} are none: {error}") from None
+        raise Unverified(f"the results in {name} cannot be read: {error}") from None
     if not table.columns:
-        raise Unverified(f"the results in {name} have times only, and no variable")
+        raise Unverified(f"the results in {name} have only times and no variable")
     repeated = np.flatnonzero(np.diff(table.times) <= 0.0)
     if repeated.size:
         raise Unverified(
             f"the results in {name} have the time {table.times[repeated[0]]:.12g} s twice, before and after an event; "
-            "this master sees the values after it only"
+            "this master sees only the values after it"
         )
     return table
 
@@ -51,14 +51,14 @@ class Expected:
         for number, row in enumerate(rows, start=2):
             if len(row) != port.size:
                 raise Unverified(
-                    f"the results have {len(row)} values of '{name}' in row {number}, and the FMU has {port.size}"
+                    f"the results have {len(row)} values of '{name}' in row {number}, but the FMU has {port.size}"
                 )
             values = [_parsed(cell, port) for cell in row]
             if None in values:
                 wrong = row[values.index(None)]
                 raise Unverified(
-                    f"the results have {quoted(wrong)} for '{name}' in row {number}, which a variable of type "
-                    f"{port.type} cannot be"
+                    f"the results have {quoted(wrong)} for '{name}' in row {number}, which is not a value of "
+                    f"type {port.type}"
                 )
             parsed.append(values)
         # Whole numbers of 64 bits are exact as objects only.

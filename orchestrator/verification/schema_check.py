@@ -34,7 +34,8 @@ def _check(root: Any, schema: str, name: str) -> None:
     if not found.validate(etree.ElementTree(root)):
         problem = found.error_log[0]
         raise InputError(
-            f"{name}, line {problem.line}: not as FMI-LS-REF has it: {shortened(problem.message, _LONGEST)}"
+            f"{name}, line {problem.line}: this does not follow the schema of FMI-LS-REF: "
+            f"{shortened(problem.message, _LONGEST)}"
         )
 
 

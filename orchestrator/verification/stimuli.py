@@ -47,6 +47,6 @@ def _split(column: str, cells: Sequence[str], port: Port) -> list[tuple[str, ...
     for number, row in enumerate(rows, start=2):
         if len(row) != port.size:
             raise InputError(
-                f"column '{shortened(column)}', row {number}: {len(row)} values, where the input has {port.size}"
+                f"column '{shortened(column)}', row {number}: {len(row)} values, but the input has {port.size}"
             )
     return list(zip(*rows, strict=True))

@@ -31,21 +31,21 @@ def read_values(content: bytes) -> ValueTable:
     """The table in a file's `content`; InputError names the row and the column of what is wrong, not the file."""
     rows = _rows(content)
     if not rows:
-        raise InputError(f"it is empty; give a line of names, {_TIME} first, and a line for every time")
+        raise InputError(f"it is empty; write a line of names that begins with {_TIME}, and a line for every time")
     names = [cell.strip() for cell in rows[0]]
     if names[0] != _TIME:
         raise InputError(f"its first column is {quoted(names[0])}; it has to be {_TIME}, in s")
     if len(rows) < 2:
-        raise InputError("it has names and no values; give a line for every time")
+        raise InputError("it has names but no values; write a line for every time")
     seen: set[str] = set()
     for name in names:
         if not name or name in seen:
             what = f"'{shortened(name)}' twice" if name else "without a name"
-            raise InputError(f"it has a column {what}; give every column a name of its own")
+            raise InputError(f"it has a column {what}; give every column a unique name")
         seen.add(name)
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
-            raise InputError(f"row {number} has {len(row)} cells, where there are {len(names)} columns")
+            raise InputError(f"row {number} has {len(row)} cells, but there are {len(names)} columns")
     cells = dict(zip(names, zip(*rows[1:], strict=True), strict=True))
     return ValueTable(_times(cells.pop(_TIME)), cells)
 
@@ -57,7 +57,7 @@ def _rows(content: bytes) -> list[list[str]]:
         text = io.StringIO(content.decode("utf-8-sig"), newline="")
         return [row for row in csv.reader(text) if any(cell.strip() for cell in row)]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"it is no table of comma-separated values in UTF-8 ({shortened(str(error))})") from None
+        raise InputError(f"it is not a table of comma-separated values in UTF-8 ({shortened(str(error))})") from None
     finally:
         csv.field_size_limit(before)
 
@@ -73,6 +73,6 @@ def _times(cells: Sequence[str]) -> NDArray[np.float64]:
             raise InputError(f"row {place + 2}: the time is {quoted(cell)}; expected a finite number, in s")
         if place and times[place] < times[place - 1]:
             raise InputError(
-                f"row {place + 2}: the times go back, from {times[place - 1]:.12g} to {times[place]:.12g} s"
+                f"row {place + 2}: the time decreases from {times[place - 1]:.12g} to {times[place]:.12g} s"
             )
     return times

@@ -24,7 +24,7 @@ _BUTTONS = ["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d
 
 
 def document(title: str, body: str, style: str = "") -> str:
-    """The whole page: `title` is a stranger's text, `body` is HTML that stands below it, `style` rules of its own."""
+    """The whole page: `title` is other people's text, `body` is HTML that stands below it, `style` rules of its own."""
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>

@@ -1,4 +1,4 @@
-"""Text of strangers as the letters of HTML, which Plotly reads too."""
+"""Other people's text, escaped for HTML, which Plotly reads too."""
 
 from html import escape
 

@@ -24,7 +24,7 @@ def parsed_tolerances(texts: Iterable[str]) -> dict[str, float]:
             limit = float(number)
         except ValueError:
             raise InputError(
-                f"{told}: '{shortened(number)}' is no number; its unit of measure is that of the measure"
+                f"{told}: '{shortened(number)}' is not a number; its unit of measure is that of the measure"
             ) from None
         if not isfinite(limit) or limit <= 0.0:
             raise InputError(f"{told}: a limit on an error is a finite number above 0")

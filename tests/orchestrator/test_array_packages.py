@@ -265,7 +265,7 @@ def test_an_array_of_fmi_3_has_no_elements_in_a_package(box: Path, cosim: Cosim,
     )
     ended = cosim("build", tmp_path / "part.yaml", "--ssp", "--output", tmp_path / "out")
     assert ended.code == 2
-    assert "of the array b.u of FMI 3.0 single elements are connected" in ended.err
+    assert "single elements of the array b.u of FMI 3.0 are connected" in ended.err
     assert "connect whole arrays" in ended.err
 
 
@@ -323,9 +323,9 @@ _TO_SQUARE = '<ssd:Connection startElement="a" startConnector="gained" endElemen
         (
             _component("a", _given("gain", "Float64", "1", 1).replace('size="1"', "")),
             "",
-            "'gain' has a dimension without a size of its own",
+            "'gain' has a dimension without its own size",
         ),
-        (_component("a", _given("ui8", "UInt8", "256")), "", "not as SSP 2.0 has it"),
+        (_component("a", _given("ui8", "UInt8", "256")), "", "does not follow the schema of SSP 2.0"),
         (_component("a", _given("ui8", "Int32", "256")), "", "'ui8' of type UInt8 cannot be 256"),
         (_component("a", _given("on", "Int32", "1")), "", "'on' of type Boolean cannot be 1"),
         (_component("a", _given("gain", "Boolean", "0 1 0 1", 2, 2)), "", "'gain' of type Float64 cannot be False"),
@@ -347,9 +347,9 @@ def test_what_does_not_fit_is_refused_in_one_message(
     [
         ("3.0", "2.0", "SystemStructure.ssd: it is of SSP 3.0, which is not supported"),
         ("2.1", "2.0", "SystemStructure.ssd: it is of SSP 2.1, which is not supported"),
-        ("1.0", "2.0", "not as SSP 1.0 has it"),
+        ("1.0", "2.0", "does not follow the schema of SSP 1.0"),
         ("2.0", "2.7", "the parameter set of component 'a': it is of SSP 2.7, which is not supported"),
-        ("2.0", "1.0", "not as SSP 1.0 has it"),
+        ("2.0", "1.0", "does not follow the schema of SSP 1.0"),
     ],
 )
 def test_each_file_is_read_by_its_own_version(version: str, inside: str, words: str, box: Path, tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_wrong_surfaces_are_refused_without_mechanics_too(both: Any, small_heart
     outer = small_heart.boundary("epicardium")
     right = small_heart.points[outer].mean(axis=1)[:, 0] > 0
     path = _file(tmp_path / "o.msh", small_heart, epicardium=outer[~right], rv_epicardium=outer[right])
-    words = ["of 484 faces of the surface are none of", "in 'rv_epicardium')"]
+    words = ["of 484 faces of the surface are in none of", "in 'rv_epicardium')"]
     _refused(both, path, *words)
     _refused(both, path, *words, sets=(_WITHOUT_MECHANICS,))
     shown, ran, summary = both(path, "scene.boundaries={epicardium: [epicardium, rv_epicardium]}")

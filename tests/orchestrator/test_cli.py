@@ -92,7 +92,7 @@ def test_exit_codes_as_a_shell_sees_them(small_scenario: Path, tmp_path: Path) -
         "units.mechanics.parameters.neo_hooke_log_sign=as_printed",
     )
     assert (failed.returncode, failed.stdout) == (3, "")
-    assert failed.stderr.startswith("failed: unit 'mechanics' failed at its initialisation")
+    assert failed.stderr.startswith("failed: unit 'mechanics' failed during initialisation")
     assert "Traceback" not in failed.stderr + wrong.stderr
 
 
@@ -275,7 +275,7 @@ _SETS: dict[str, tuple[list[str], list[str]]] = {
     "geometry in too small steps": (["scene={geometry: biventricle, mesh_size_mm: 1e-5}"], ["scene", "mm"]),
     "FMU that is not there": (["units.extra={fmu: nowhere.fmu}"], ["unit 'extra'", "nowhere.fmu: no such FMU"]),
     "FMU without a name": (["units.extra={fmu: ''}"], ["unit 'extra'", "this folder has no modelDescription.xml"]),
-    "FMU that is a scenario": (["units.extra={fmu: small.yaml}"], ["unit 'extra'", "small.yaml", "no zip archive"]),
+    "FMU that is a scenario": (["units.extra={fmu: small.yaml}"], ["unit 'extra'", "small.yaml", "not a zip archive"]),
 }
 
 
@@ -509,8 +509,8 @@ def test_an_fmu_of_another_mesh_does_not_fit(
     ("description", "words"),
     [
         (None, ["broken.fmu", "has no modelDescription.xml"]),
-        ("", ["broken.fmu", "no well-formed XML"]),
-        ("<not xml", ["broken.fmu", "no well-formed XML"]),
+        ("", ["broken.fmu", "not well-formed XML"]),
+        ("<not xml", ["broken.fmu", "not well-formed XML"]),
         (
             '<fmiModelDescription fmiVersion="1.0" modelName="a" modelIdentifier="a" guid="x" '
             'numberOfContinuousStates="0" numberOfEventIndicators="0"><ModelVariables/><Implementation>'

@@ -202,7 +202,7 @@ def test_units_that_wait_and_units_without_memory_are_no_excuse(
 
 @pytest.mark.parametrize("scheme", ["jacobi", "gauss-seidel"])
 def test_a_start_that_looks_like_the_solution_is_none(scheme: str, fake: Any, port: Any, solve: Solve) -> None:
-    # All values are what was foretold, but the unit that has changed its mind: a drive that sets in at the third step.
+    # All values are those extrapolated, but the unit that has changed its mind: a drive that sets in at the third step.
     def driven(given: Any, outputs: Any, time: float, size: float) -> dict[str, Any]:
         return {"xa": 0.5 * given["xc"] + (1.0 if time > 1.5e-3 else 0.0)}
 

@@ -275,15 +275,17 @@ def test_the_shortest_way_round_is_named_and_followers_are_left_out(fake: Any, p
     assert "the same holds for c.s" in told
     assert "d.t" not in told
     (alone,) = diagnosis.paragraphs({"d.t": _GROWS})
-    assert "It is exchanged in no loop, so that unit 'd' alternates by itself" in alone
+    assert "It is exchanged in no loop, so unit 'd' alternates by itself" in alone
 
 
 def test_the_gain_follows_from_rate_period_and_scheme(fake: Any, port: Any, master: Any) -> None:
     found = Alternation("growing", 1.1, 4, 3.0, 20.0, 0.25)
     (told,) = master(_units(fake, port), scheme="jacobi").diagnosis.paragraphs({"a.p": found})
-    assert "|g| is that factor to the power of 2. If all its units answer at once, |g| is about 1.21 here" in told
+    assert (
+        "|g| is that factor to the power of 2. If all its units respond without delay, |g| is about 1.21 here" in told
+    )
     (told,) = master(_units(fake, port)).diagnosis.paragraphs({"a.p": _GROWS})
-    assert "|g| is that factor. If all its units answer at once, |g| is about 1.5 here" in told
+    assert "|g| is that factor. If all its units respond without delay, |g| is about 1.5 here" in told
 
 
 def test_a_stabilising_output_that_nothing_takes_is_a_remedy(fake: Any, port: Any, master: Any) -> None:

@@ -210,7 +210,7 @@ def first(bodies: dict[str, Path]) -> Any:
 
 
 def test_an_fmu_that_asks_for_the_end_is_told_from_one_that_fails(first: Any) -> None:
-    with pytest.raises(ParticipantTerminated, match="asks for the end of the simulation") as end:
+    with pytest.raises(ParticipantTerminated, match="requested the end of the simulation") as end:
         first("ends").start(0.05, 0.01)
     assert end.value.time_s == 0.05
     with pytest.raises(ParticipantError, match=r"^40 % too long$") as failure:
@@ -232,7 +232,7 @@ def test_an_fmu_that_takes_no_second_derivatives_gets_the_first_and_says_so_once
     lines, _ = simulate(*settings, kinds=("lines", "lines"))
     notes = [line for line in capfd.readouterr().err.splitlines() if line.startswith("note: ")]
     assert [note.partition(";")[0] for note in notes] == [
-        f"note: unit '{unit}' takes derivatives of its inputs up to order 1" for unit in ("first", "second")
+        f"note: unit '{unit}' accepts derivatives of its inputs up to order 1" for unit in ("first", "second")
     ]
     # Straight lines, to ends that are known to second order.
     assert np.abs(_states(lines) - _MASSES.exact(2.0)).max() < 5e-3

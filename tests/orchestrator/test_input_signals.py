@@ -124,18 +124,18 @@ def test_a_driven_run_goes_on_from_a_checkpoint(simulate: Simulate, tmp_path: Pa
         ("time,u\n", "it has no values"),
         ("t,u\n0,1\n", "the first column is 't'; it has to be time_ms, or time"),
         ("time;u\n0;1\n", "the first column is 'time;u'"),
-        ("time,uu\n0,1\n", "column 'uu' is no input; did you mean 'u'"),
-        ("time,a.y\n0,1\n", r"column 'a\.y' is no input"),
-        ("time,u\n0,1\n2,1\n1,1\n", "row 4: the times go back, from 2 to 1 s"),
+        ("time,uu\n0,1\n", "column 'uu' is not an input of any unit; did you mean 'u'"),
+        ("time,a.y\n0,1\n", r"column 'a\.y' is not an input of any unit"),
+        ("time,u\n0,1\n2,1\n1,1\n", "row 4: the time decreases from 2 to 1 s"),
         ("time,u\n0,1\n0,1\n0,1\n", "row 4: three rows have the time 0 s"),
-        ("time,u\n0,nan\n", "column 'u', row 2: 'nan' is no value that the input can have"),
-        ("time,u\n0,1\n1,\n", "column 'u', row 3: '' is no value"),
-        ("time,u\n0,one\n", "column 'u', row 2: 'one' is no value"),
-        ("time,n\n0,1.5\n", r"column 'n', row 2: '1\.5' is no value"),
-        ("time,n\n0,3000000000\n", "column 'n', row 2: '3000000000' is no value"),
-        ("time,b\n0,2\n", "column 'b', row 2: '2' is no value"),
-        ("time,u\n0,1,2\n", "row 2 has 3 cells, where there are 2 columns"),
-        ("time,u,u\n0,1,2\n", "a column 'u' stands twice"),
+        ("time,u\n0,nan\n", "column 'u', row 2: 'nan' is not a valid value of the input"),
+        ("time,u\n0,1\n1,\n", "column 'u', row 3: '' is not a valid value"),
+        ("time,u\n0,one\n", "column 'u', row 2: 'one' is not a valid value"),
+        ("time,n\n0,1.5\n", r"column 'n', row 2: '1\.5' is not a valid value"),
+        ("time,n\n0,3000000000\n", "column 'n', row 2: '3000000000' is not a valid value"),
+        ("time,b\n0,2\n", "column 'b', row 2: '2' is not a valid value"),
+        ("time,u\n0,1,2\n", "row 2 has 3 cells, but there are 2 columns"),
+        ("time,u,u\n0,1,2\n", "a column 'u' occurs twice"),
         ("time,u,a.u\n0,1,2\n", r"column 'a\.u': the input a\.u is connected, or driven by another column"),
         ("time,\n0,1\n", "a column without a name"),
     ],
@@ -170,9 +170,9 @@ def test_show_tells_what_is_driven(simulate: Simulate, tmp_path: Path) -> None:
     assert "x.csv -> a.u" in shown
     assert "a.u: no unit gives it" not in shown
     assert "a.step: no unit gives it" in shown
-    assert "does not judge what the signals of x.csv do" not in shown
+    assert "does not see how the signals in x.csv change" not in shown
     scenario = load_scenario(tmp_path / "s.yaml", ["coupling.adaptive={max_ms: 50}"])
-    assert "does not judge what the signals of x.csv do inside of a step; keep `max_ms` (50 ms)" in show_scenario(
+    assert "does not see how the signals in x.csv change within a step; keep `max_ms` (50 ms)" in show_scenario(
         scenario, tmp_path
     )
 

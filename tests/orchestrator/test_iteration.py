@@ -374,7 +374,7 @@ def test_a_loop_without_initial_values_fails_at_the_initialisation(fake: Any, po
     units = _feedthrough(fake, port)
     units["a"].initially = lambda given: {"y": 1.0 - 3.0 * given["x"]}
     with pytest.raises(
-        RunError, match=r"^the coupling failed at its initialisation: no convergence in 50 sweeps: b\.x"
+        RunError, match=r"^the coupling failed during initialisation: no convergence in 50 sweeps: b\.x"
     ):
         _run(units)
 

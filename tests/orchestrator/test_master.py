@@ -176,7 +176,7 @@ def test_a_unit_that_cannot_start_is_named_before_anyone_saw_a_step(
     units = {"a": fake("a", outputs=[port("x")]), "b": fake("b", [port("x")])}
     monkeypatch.setattr(units["b"], moment, fail.__get__(units["b"]))
     watch = _Watch()
-    with pytest.raises(RunError, match=r"unit 'b' failed at its initialisation: there is no state to start from"):
+    with pytest.raises(RunError, match=r"unit 'b' failed during initialisation: there is no state to start from"):
         master(units, steps=9).run([watch])
     assert watch.steps == []
 

@@ -225,7 +225,7 @@ def test_inputs_that_nobody_feeds_take_the_value_of_the_connector(tmp_path: Path
         assert scenario.units["B_c"].start == {"u": 0.25}
         assert scenario.units["B_c"].parameters == {"gain": 3.0}
     assert len(told) == 2
-    assert all("gives its parameter value to nobody" in text for text in told)
+    assert all("passes its parameter value to no component" in text for text in told)
 
 
 def test_inputs_without_a_value_keep_their_start_values(tmp_path: Path) -> None:
@@ -416,7 +416,7 @@ _LINEAR = '<ssm:MappingEntry source="g" target="word"><ssc:LinearTransformation 
                 system("B", component("c"), ["u -> y"], u="input", y="output") + component("a"),
                 ["B.y -> B.u", "B.y -> a.u"],
             ),
-            "lead in a circle",
+            "form a circle",
         ),
         (
             system("A", component("a") + component("b"), ["a.y -> b.gain"]),
@@ -445,7 +445,7 @@ _LINEAR = '<ssm:MappingEntry source="g" target="word"><ssc:LinearTransformation 
         (system("A", component("a", bindings=bound(values(g=("Real", 3)), _TABLE))), "a table for the type Integer"),
         (
             system("A", component("a", bindings=bound(values(g=("String", 3)), _TABLE.replace("Integer", "String")))),
-            "not as SSP 1.0 has it",
+            "does not follow the schema of SSP 1.0",
         ),
         (
             system(
@@ -456,7 +456,10 @@ _LINEAR = '<ssm:MappingEntry source="g" target="word"><ssc:LinearTransformation 
             ),
             "several parameters are mapped to 'gain'",
         ),
-        (system("A", component("a", bindings=bound(values(g=("String", 3)), _LINEAR))), "no linear transformation"),
+        (
+            system("A", component("a", bindings=bound(values(g=("String", 3)), _LINEAR))),
+            "cannot be transformed linearly",
+        ),
         (system("A", component("B", "SystemStructure.ssd", kind="ssp-definition")), "refers to itself"),
         (
             system(
@@ -511,9 +514,9 @@ _RUN = {"stop_ms": 1000.0}
         (" " * 1_000_001, "more than 1000000 characters"),
         (json.dumps({"run": _RUN, "units": {"a": {"fmu": "/etc/passwd"}}}), "'units' does not belong there"),
         (json.dumps({"run": _RUN, "connections": ["a.y -> a.u"]}), "'connections' does not belong there"),
-        (json.dumps({"run": _RUN, "every": [1]}), "'every' does not belong there, or is no section"),
+        (json.dumps({"run": _RUN, "every": [1]}), "'every' does not belong there, or is not a section"),
         (json.dumps({"run": _RUN, "every": {"a": {"b": 1}}}), "'units.a.every'"),
-        (json.dumps({"run": _RUN | {"workers": "tcp://example.org:8786"}}), "not to choose other machines"),
+        (json.dumps({"run": _RUN | {"workers": "tcp://example.org:8786"}}), "must not choose other machines"),
         (json.dumps({"run": _RUN, "scene": {"mesh": "/etc/passwd"}}), "outside of the package"),
         (json.dumps({"run": _RUN, "scene": {"mesh": "../../x.msh"}}), "outside of the package"),
         (json.dumps({"run": _RUN, "coupling": {"step_ms": "x" * 100_000}}), "'coupling.step_ms'"),

@@ -216,7 +216,11 @@ def test_what_changed_since_is_named_and_nothing_is_touched(
         monkeypatch.setattr(origins, "_version", lambda name: "0.0.1" if name == "numpy" else version(name))
     ended = cosim(*_arguments(small_scenario, out, "--resume", "--set", "scene.mesh=own.msh"))
     assert (ended.code, ended.err.count("\n")) == (2, 1), ended
-    words = {"mesh": "own.msh has changed since", "no mesh": "own.msh is gone", "program": "this program has changed"}
+    words = {
+        "mesh": "own.msh has changed since",
+        "no mesh": "own.msh is missing",
+        "program": "this program has changed",
+    }
     assert words.get(change, "is 0.0.1") in ended.err
     assert "run without --resume" in ended.err
     assert _bytes(out) == before

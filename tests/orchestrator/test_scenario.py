@@ -250,9 +250,9 @@ _WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "no name": (_changed("name: small", "name:"), ["'name' is empty", "expected a text"]),
     "way out of the results folder": (_changed("name: small", "name: ../../x"), ["'name'", "begin with a letter"]),
     "folder above as name": (_changed("name: small", "name: .."), ["'name': '..'", "begin with a letter"]),
-    "line break in the name": (_changed("name: small", 'name: "small\\n"'), ["'name'", "no valid name"]),
-    "unit with a space": (_changed("mechanics: {", "the mechanics: {"), ["'units.the mechanics'", "no valid name"]),
-    "unit with a hyphen": (_changed("mechanics: {", "my-mechanics: {"), ["'units.my-mechanics'", "no valid name"]),
+    "line break in the name": (_changed("name: small", 'name: "small\\n"'), ["'name'", "not a valid name"]),
+    "unit with a space": (_changed("mechanics: {", "the mechanics: {"), ["'units.the mechanics'", "not a valid name"]),
+    "unit with a hyphen": (_changed("mechanics: {", "my-mechanics: {"), ["'units.my-mechanics'", "not a valid name"]),
     "unit that begins with a digit": (_changed("mechanics: {", "1st: {"), ["'units.1st'", "begin with a letter"]),
     "unit by number": (_changed("mechanics: {", "1: {"), ["'units.1'", "quotes"]),
     # probes

@@ -380,7 +380,7 @@ def test_what_a_slow_unit_gives_is_extrapolated_between_its_steps(fake: Any, por
     }
     master(units, 8, every_ms=8.0, every={"slow": 2}, inputs=Inputs(1)).run([])
     seen = [float(call[3]) for call in units["fast"].calls if call[1] == "set"][1:]
-    # A line is foretold exactly as soon as two of its points are known.
+    # A line is extrapolated exactly as soon as two of its points are known.
     np.testing.assert_allclose(seen, [0, 2, 3, 4, 5, 6, 7, 8], atol=1e-12)
 
 

@@ -640,9 +640,9 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [('prefix="second."', 'prefix="second." sourceBase="component"')],
             {},
-            ["the parameter set of the system is to be in an FMU"],
+            ["the parameter set of the system is declared to be inside an FMU"],
         ),
-        ([(' source="resources/damping.ssv"', "")], {}, ["needs either a source or a ParameterSet"]),
+        ([(' source="resources/damping.ssv"', "")], {}, ["needs either a source or its own ParameterSet"]),
         ([("resources/damping.ssv", "resources/dampng.ssv")], {}, ["resources/dampng.ssv", "not in the package"]),
         ([("resources/damping.ssv", "../damping.ssv")], {}, ["../damping.ssv, outside of the package"]),
         ([("resources/damping.ssv", "https://example.org/damping.ssv")], {}, ["outside of the package"]),
@@ -651,11 +651,11 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
             {},
             ["the FMU of component 'first', resources/muss.fmu", "not in the package"],
         ),
-        ([], {"resources__damping_dot_ssv": "<ssv"}, ["resources/damping.ssv: it is no well-formed XML"]),
+        ([], {"resources__damping_dot_ssv": "<ssv"}, ["resources/damping.ssv: it is not well-formed XML"]),
         (
             [],
             {"resources__damping_dot_ssv": _ssv(c=1).replace("ssv:Real value", "ssv:Reel value")},
-            ["resources/damping.ssv, line 1", "not as SSP 1.0 has it", "Reel"],
+            ["resources/damping.ssv, line 1", "does not follow the schema of SSP 1.0", "Reel"],
         ),
         (
             [],
@@ -665,7 +665,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [],
             {"resources__damping_dot_ssv": _ssv(c=1).replace('ssv:Real value="1"', 'ssv:Enumeration value="thick"')},
-            ["'first.c' has no item 'thick'", "it is no enumeration"],
+            ["'first.c' has no item 'thick'", "it is not an enumeration"],
         ),
         (
             [],
@@ -673,7 +673,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
             ["'c' of type Real cannot be 'thick'"],
         ),
         ([], {"resources__damping_dot_ssv": _ssv(F=1)}, ["'F'", "takes a start value"]),
-        ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: it is no well-formed XML"]),
+        ([], {"SystemStructure_dot_ssd": "no XML"}, ["SystemStructure.ssd: it is not well-formed XML"]),
         (
             [('version="1.0" name="two masses"', 'version="3.0" name="two masses"')],
             {},
@@ -682,7 +682,7 @@ _OUTSIDE = '<ssd:Connection startConnector="u" endElement="second" endConnector=
         (
             [("<ssd:Connections>", "<ssd:Conections>"), ("</ssd:Connections>", "</ssd:Conections>")],
             {},
-            ["not as SSP 1.0 has it", "Conections"],
+            ["does not follow the schema of SSP 1.0", "Conections"],
         ),
         ([('startTime="0"', 'startTime="1"')], {}, ["starts at 1 s", "only runs that start at 0"]),
         ([('stopTime="2"', 'stopTime="-2"')], {}, ["stops at -2 s"]),

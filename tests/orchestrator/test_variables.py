@@ -239,7 +239,10 @@ def test_a_run_with_texts_goes_on_from_a_checkpoint(simulate: Simulate, tmp_path
     [
         ([("x", "Real", "output", 16), ("x", "Integer", "input", 0)], "two of its variables are named 'x'"),
         ([("x", "Real", "output", 2**32 + 16)], "'x' has no valid value reference: 4294967312"),
-        ([("x", "Real", "output", 16, "", 'declaredType="Nothing"')], "'x' is of the type 'Nothing', which it lacks"),
+        (
+            [("x", "Real", "output", 16, "", 'declaredType="Nothing"')],
+            "'x' is of the type 'Nothing', which it does not define",
+        ),
         ([("x", "Colour", "output", 16)], "variable 'x' has no type"),
         ([("", "Real", "output", 16)], "one of its variables has no name"),
     ],
@@ -250,7 +253,7 @@ def test_descriptions_that_contradict_themselves_are_refused(simulate: Simulate,
 
 
 def test_an_enumeration_without_numbers_is_refused(simulate: Simulate) -> None:
-    with pytest.raises(InputError, match="the item 'off' of its type 'Mode' has no whole number"):
+    with pytest.raises(InputError, match="the item 'off' of its type 'Mode' has a value that is not a whole number"):
         simulate(_ALL, head=_TYPES.replace("value='1'", "value='one'"))
 
 
@@ -283,7 +286,7 @@ def test_a_second_instance_of_an_fmu_that_allows_one_needs_a_process_of_its_own(
     (tmp_path / "s.yaml").write_text(
         "name: s\nunits: {a: {fmu: a.fmu}, b: {fmu: a.fmu}}\nconnect_by_name: false\nrun: {stop_ms: 5}\n"
     )
-    with pytest.raises(InputError, match=r"^unit 'b': .*only once per process .* unit 'a' has it already"):
+    with pytest.raises(InputError, match=r"^unit 'b': .*only once per process .* unit 'a' already uses it"):
         run_scenario(load_scenario(tmp_path / "s.yaml"), tmp_path, tmp_path / "out")
     # One after the other is no trouble.
     scenario = load_scenario(tmp_path / "s.yaml", ["units={a: {fmu: a.fmu}}"])

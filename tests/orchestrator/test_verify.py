@@ -120,7 +120,7 @@ def test_a_result_by_itself_is_that_of_the_default_experiment(fmu: Any) -> None:
     assert verify_fmu(fmu(files=files, head='<DefaultExperiment startTime="0" stopTime="2" stepSize="1"/>')).is_verified
     # Where nobody says anything of steps, the results do.
     assert verify_fmu(fmu(files=files)).is_verified
-    for end, told in ((3, "the results end at 2 s"), (1, "go on to 2 s")):
+    for end, told in ((3, "the results end at 2 s"), (1, "continue to 2 s")):
         other = fmu(files=files, head=f'<DefaultExperiment startTime="0" stopTime="{end}"/>')
         assert told in _failure(other)
 
@@ -211,7 +211,7 @@ def test_arrays_of_fmi_3_stand_in_one_cell(tmp_path: Path) -> None:
     short = files | {"out.csv": "time,y\n0,2 3 4\n1,2 3\n2,3 3 3\n"}
     assert "2 values of 'y' in row 3" in _failure(reference.with_files(box, tmp_path / "a.fmu", short))
     narrow = files | {"in.csv": "time,u\n0,1 2\n"}
-    with pytest.raises(InputError, match="row 2: 2 values, where the input has 3"):
+    with pytest.raises(InputError, match="row 2: 2 values, but the input has 3"):
         verify_fmu(reference.with_files(box, tmp_path / "a.fmu", narrow))
 
 
@@ -258,8 +258,8 @@ def test_a_variable_that_the_fmu_lacks_is_told(fmu: Any) -> None:
         ("1.5,5.5", "1.5,", "'' for 'y' in row 5"),
         ("1.5,5.5,6", "1.5,5.5,6.5", "'6.5' for 'm' in row 5"),
         ("time,y", "t,y", "it has to be time"),
-        ("\n1.5,5.5", "\n1.4,5.5", "no communication point"),
-        ("\n1.5,5.5", "\n0.9,5.5", "go back"),
+        ("\n1.5,5.5", "\n1.4,5.5", "not a communication point"),
+        ("\n1.5,5.5", "\n0.9,5.5", "the time decreases"),
         ("\n1.5,5.5", "\n1,5.5", "twice"),
         ("\n1.5,5.5", "\nnan,5.5", "finite number"),
         ("\n1.5,5.5", "\n1.0000000001,5.5", "two rows at the communication point"),
@@ -296,12 +296,12 @@ def test_an_fmu_that_fails_is_told_with_the_time(bodies: dict[str, Path], tmp_pa
     ("changes", "told"),
     [
         ({"fmi-ls-manifest.xml": None}, "no reference experiments in it"),
-        ({"fmi-ls-manifest.xml": "<fmiReferences"}, "no well-formed XML"),
-        ({"fmi-ls-manifest.xml": "<x/>"}, "no manifest of org.fmi-standard.fmi-ls-ref"),
+        ({"fmi-ls-manifest.xml": "<fmiReferences"}, "not well-formed XML"),
+        ({"fmi-ls-manifest.xml": "<x/>"}, "not a manifest of org.fmi-standard.fmi-ls-ref"),
         ({"fmi-ls-manifest.xml": "<!DOCTYPE x []><fmiReferences/>"}, "document type"),
         ({"fmi-ls-manifest.xml": reference.manifest("")}, "no experiment with results"),
         ({"fmi-ls-manifest.xml": reference.manifest('<Related source="a" role="cook"/>')}, "role"),
-        ({"fmi-ls-manifest.xml": reference.manifest("<Relative/>")}, "not as FMI-LS-REF has it"),
+        ({"fmi-ls-manifest.xml": reference.manifest("<Relative/>")}, "does not follow the schema of FMI-LS-REF"),
         (
             {"fmi-ls-manifest.xml": reference.manifest(reference.related(role="experiment/uncertainty-analysis"))},
             "no exp",
@@ -314,7 +314,7 @@ def test_an_fmu_that_fails_is_told_with_the_time(bodies: dict[str, Path], tmp_pa
         ({"in.csv": "time,u\n0,1\n1\n"}, "row 3 has 1 cells"),
         ({"in.csv": "time,u,u\n0,1,2\n"}, "'u' twice"),
         ({"tests.exp": "<Experiments/>"}, "tests.exp, line 1"),
-        ({"tests.exp": "<x xmlns='y'/>"}, "another format is not read"),
+        ({"tests.exp": "<x xmlns='y'/>"}, "other formats are not read"),
         ({"tests.exp": reference.experiments('stopTime="-1"')}, "correct stopTime"),
         ({"tests.exp": reference.experiments('stepSize="0"')}, "a stepSize is above 0"),
         ({"tests.exp": reference.experiments('stepSize="INF"')}, "expected a finite number"),

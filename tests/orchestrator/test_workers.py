@@ -149,7 +149,7 @@ def test_a_unit_that_hangs_is_given_up(asleep: type[Recipe]) -> None:
     with Workers("processes", 1, 1.0) as workers:
         unit = workers.make(asleep("sleeper", {"seconds": 600.0}))
         wait = unit.start(0.0, 1.0)
-        with pytest.raises(ParticipantLost, match=r"did not come back within 1 s \(run\.unit_time_limit_s\)"):
+        with pytest.raises(ParticipantLost, match=r"did not return within 1 s \(run\.unit_time_limit_s\)"):
             wait()
 
 
@@ -159,7 +159,7 @@ def test_a_unit_that_dies_takes_only_its_process_along(asleep: type[Recipe]) -> 
         pid = int(doomed.get("place")[0])
         wait = doomed.start(0.0, 1.0)
         os.kill(pid, signal.SIGKILL)
-        with pytest.raises(ParticipantLost, match="the process it worked in is gone"):
+        with pytest.raises(ParticipantLost, match="its process ended unexpectedly"):
             wait()
         other.start(0.0, 1.0)()
 
@@ -221,7 +221,7 @@ def test_when_a_worker_is_killed_the_results_so_far_are_readable_and_the_run_can
     finally:
         process.kill()
     assert process.returncode == 3, message
-    assert "the process it worked in is gone" in message
+    assert "its process ended unexpectedly" in message
     assert json.loads((out / "summary.json").read_text())["status"] == "failed"
     series = (out / "timeseries.csv").read_bytes()
     assert whole.startswith(series)

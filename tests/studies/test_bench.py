@@ -182,7 +182,7 @@ def test_several_at_the_same_time_come_to_the_same_and_are_compared_by_processor
     one, many = steps.chart, charted(study, workers=2)
     assert [row.errors for row in many.rows] == [row.errors for row in one.rows]
     assert (one.cost, many.cost) == ("wall_s", "cpu_s")
-    assert any("beside others" in note for note in many.notes)
+    assert any("several points ran at the same time" in note for note in many.notes)
 
 
 def test_the_workers_of_a_scheduler_do_it_as_well(

@@ -35,7 +35,11 @@ _MISTAKES: dict[str, tuple[str, str, list[str]]] = {
     "no reference": ("reference: {coupling.step_ms: 0.25}", "set: {}", ["'reference' is missing"]),
     "empty reference": ("{coupling.step_ms: 0.25}", "{}", ["reference", "finer"]),
     "three references": ("{coupling.step_ms: 0.25}", "[{run.stop_ms: 1}, {run.stop_ms: 2}, {run.stop_ms: 4}]", ["two"]),
-    "results and settings": ("{coupling.step_ms: 0.25}", "{results: x, run.stop_ms: 20}", ["stands alone"]),
+    "results and settings": (
+        "{coupling.step_ms: 0.25}",
+        "{results: x, run.stop_ms: 20}",
+        ["cannot be combined with settings"],
+    ),
     "reference that cannot be": ("{coupling.step_ms: 0.25}", "{coupling.step_ms: 0.3}", ["reference", "0.3"]),
     "no scenario": ("small_cell.yaml", "large_cell.yaml", ["large_cell.yaml: no such scenario file"]),
 }

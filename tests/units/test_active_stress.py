@@ -213,7 +213,7 @@ def test_length_dependence_that_would_push_is_refused(cube, started) -> None:
     unit.do_step(0.0, 0.001)
     assert (unit.get("active_stress") > 0.0).all()
     unit.set("stretch", np.full(cube.elements, 0.79))
-    with pytest.raises(StepFailure, match="length_dependence 5 turns it negative"):
+    with pytest.raises(StepFailure, match="length_dependence 5 makes the active stress negative"):
         unit.do_step(0.001, 0.001)
 
 

@@ -361,10 +361,10 @@ def test_senseless_seeds_are_refused_by_name(name: str, taken: Any) -> None:
     outputs = [item.name for item in unit.outputs()]
     others = [item.name for item in unit.variables() if item.name not in (*inputs, *outputs)]
     for wrong in (*outputs, *others):
-        with pytest.raises(InvalidInput, match=f"'{wrong}' of unit '{unit.name}' is no input that may change"):
+        with pytest.raises(InvalidInput, match=f"'{wrong}' of unit '{unit.name}' is not an input that may change"):
             unit.directional_derivative({wrong: unit.get(wrong)})
     for wrong in (*inputs, *others):
-        with pytest.raises(InvalidInput, match=f"'{wrong}' of unit '{unit.name}' is no output"):
+        with pytest.raises(InvalidInput, match=f"'{wrong}' of unit '{unit.name}' is not an output"):
             unit.adjoint_derivative({wrong: unit.get(wrong)})
     for derivative, key in ((unit.directional_derivative, inputs[0]), (unit.adjoint_derivative, outputs[0])):
         with pytest.raises(InvalidInput, match=f"unit '{unit.name}' has no variable 'no_such'"):
@@ -373,7 +373,7 @@ def test_senseless_seeds_are_refused_by_name(name: str, taken: Any) -> None:
             derivative({key: np.zeros((2, 5))})
         with pytest.raises(InvalidInput, match=f"put '{key}' of unit '{unit.name}' is not finite"):
             derivative({key: np.full(np.shape(unit.get(key)), np.nan)})
-        with pytest.raises(InvalidInput, match="takes real numbers"):
+        with pytest.raises(InvalidInput, match="has to be real numbers"):
             derivative({key: "much"})
 
 

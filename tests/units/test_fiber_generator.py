@@ -290,7 +290,7 @@ def test_a_left_ventricle_is_told_from_two_whose_right_one_has_no_names(tube, st
     mesh = tube(2)
     parts = _parts(mesh)
     named = {name: faces for name, faces in parts.items() if name != "ends"}
-    message = r"\d+ of \d+ faces of the surface are none of .*no boundary named .*'rv_endocardium' or 'rv_septum'"
+    message = r"\d+ of \d+ faces of the surface are in none of .*no boundary named .*'rv_endocardium' or 'rv_septum'"
     with pytest.raises(InvalidInput, match=message):
         started(FiberGenerator, Mesh(mesh.points, mesh.cells, named))
     with pytest.raises(InvalidInput, match=f"{len(parts['ends'])} in 'ends'"):

@@ -172,7 +172,12 @@ def test_ends_are_refused_where_an_input_cannot_have_one(kind: Any, small_heart:
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [(1.0, "got shape"), ([1.0, 2.0], "got shape"), (None, "takes real numbers|got shape"), (np.nan, "is not finite")],
+    [
+        (1.0, "got shape"),
+        ([1.0, 2.0], "got shape"),
+        (None, "has to be real numbers|got shape"),
+        (np.nan, "is not finite"),
+    ],
 )
 def test_an_end_has_to_be_a_value_that_could_be_set(value: Any, said: str, cube: Any, started: Any) -> None:
     unit = started(ActiveStress, cube)

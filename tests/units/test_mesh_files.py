@@ -153,7 +153,7 @@ def test_faces_and_tetrahedra_listed_twice_are_taken_once(stored: _Stored, small
     mesh = read_mesh(stored.gmsh(tmp_path / "heart.msh"))
     _same(mesh, small_heart)
     assert mesh.notes == (
-        "300 of 1145 tetrahedra are listed twice, as overlapping volume groups are; each was taken once",
+        "300 of 1145 tetrahedra are listed twice, as happens where volume groups overlap; each was taken once",
         "110 faces of the boundary 'lv_endocardium' are listed twice; each was taken once",
     )
 
@@ -181,7 +181,7 @@ def test_faces_between_elements(stored: _Stored, small_heart: Mesh, tmp_path: Pa
     mesh = read_mesh(path)
     _same(mesh, small_heart)
     assert mesh.notes == (
-        "the group 'interface' has 1 faces that are not on the surface; no unit knows it, and it was left out",
+        "the group 'interface' has 1 faces that are not on the surface; no unit knows it, so it was left out",
     )
 
 

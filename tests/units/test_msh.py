@@ -104,7 +104,7 @@ def test_an_entity_in_two_groups_is_in_both(
     both = expected["boundaries"]["lv_endocardium"] + expected["boundaries"]["rv_endocardium"]
     assert described["boundaries"].pop("chambers") == sorted(both)
     assert described == expected
-    doubled = "845 of 1690 tetrahedra are listed twice, as overlapping volume groups are; each was taken once"
+    doubled = "845 of 1690 tetrahedra are listed twice, as happens where volume groups overlap; each was taken once"
     assert mesh.notes == ((doubled,) if version == 2.2 else ())
     assert wall_of(mesh).cavities
 

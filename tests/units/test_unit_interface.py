@@ -350,7 +350,7 @@ def test_experiment_starts_at_zero_where_there_is_a_memory(scene: _Scene, mesh) 
 def test_senseless_steps_are_refused(scene: _Scene, time: float, step: float, alive) -> None:
     unit = alive(scene)
     before = _bits(unit)
-    with pytest.raises(InvalidInput, match="both finite, the step >= 0"):
+    with pytest.raises(InvalidInput, match="both have to be finite, the step >= 0"):
         unit.do_step(time, step)
     assert _bits(unit) == before
 
@@ -812,12 +812,12 @@ def test_a_state_and_its_bytes_are_the_same(scene: _Scene, alive) -> None:
 def test_bytes_that_are_no_state_are_refused(scene: _Scene, alive) -> None:
     data = alive(scene).get_state().to_bytes()
     for wrong in (b"", b"no state", data[: len(data) // 2], data[100:]):
-        with pytest.raises(InvalidInput, match="no serialized state"):
+        with pytest.raises(InvalidInput, match="not a serialized state"):
             scene.kind.deserialize(wrong)
     # One byte of an array: the archive's own checksum tells.
     wrong = bytearray(data)
     wrong[data.index(b"NUMPY", data.index(b"state/")) + 130] ^= 1
-    with pytest.raises(InvalidInput, match="no serialized state"):
+    with pytest.raises(InvalidInput, match="not a serialized state"):
         scene.kind.deserialize(bytes(wrong))
 
 
@@ -962,7 +962,7 @@ def test_numbers_that_nothing_can_be_computed_with_are_a_failed_step(small_heart
     far = {"endocardial_angle_deg": 1e308}
     for error in (np.linalg.LinAlgError("singular"), OverflowError("too large"), ZeroDivisionError(), MemoryError()):
         message = _told(error, far, small_heart)
-        assert message.startswith("nothing can be computed any more (")
+        assert message.startswith("the computation cannot continue (")
         assert "endocardial_angle_deg = 1e+308" in message
     with pytest.raises(ZeroDivisionError):
         _told(ZeroDivisionError(), {}, small_heart)

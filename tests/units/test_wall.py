@@ -79,7 +79,7 @@ def test_a_surface_that_belongs_to_no_boundary_is_refused(of: str, small_heart: 
 
     torn = _with(mesh, split)
     count = len(torn.boundary("RV_EPI"))
-    message = rf"{count} of 484 faces of the surface are none of .*\({count} in 'RV_EPI'\).*\[epicardium, RV_EPI\]"
+    message = rf"{count} of 484 faces of the surface are in none of .*\({count} in 'RV_EPI'\).*\[epicardium, RV_EPI\]"
     for unit in (FiberGenerator, Mechanics):
         with pytest.raises(InvalidInput, match=message):
             unit.check_mesh(torn)

@@ -51,8 +51,8 @@ class ExplicitStep:
         self._step = step
         self._rates = rates
 
-    def __call__(self, values: FloatArray, foretold: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A substep from φ and the states `values`, shape (1 + states, nodes); nothing is solved, nothing `foretold`.
+    def __call__(self, values: FloatArray, expected: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A substep from φ and the states `values`, shape (1 + states, nodes); `expected` is not used.
 
         Returns the values at the end, and by how much φ grew to the second stage and to the end, shape (2, nodes).
         """

@@ -1,4 +1,4 @@
-"""The fastest mode of diffusion on a mesh: what an explicit step has to follow.
+"""The fastest mode of diffusion on a mesh, which limits explicit steps.
 
 The largest eigenvalue of (K + G) v = λ M v, in 1/ms, whose vector is the shortest wave that the mesh has.
 """

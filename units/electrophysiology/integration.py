@@ -15,7 +15,7 @@ from .ionic.model import IonicModel, Rates
 from .monodomain import Monodomain
 from .progress import LARGEST_PHI, NOT_ACTIVATED, SOLVER_ITERATIONS, SOLVER_TOLERANCE, Limits, Progress, unsolved
 
-#: One substep: from the values, and what they are foretold to grow by, to the values and what they grew by indeed.
+#: One substep: from the values, and their expected increments, to the values at its end and their actual increments.
 Step = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 #: The substep of an equation while the elements' stretches are held, of a length in ms, with the rates of the cells.
@@ -39,24 +39,24 @@ class MonodomainStep:
         self._rates = rates
         self._matrix = csr_matrix(equation.mass + _GAMMA * step * operator)
 
-    def __call__(self, values: FloatArray, foretold: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def __call__(self, values: FloatArray, expected: FloatArray) -> tuple[FloatArray, FloatArray]:
         """A substep from φ and the states `values`, shape (1 + states, nodes).
 
-        `foretold`, shape (2, nodes), is by how much φ is expected to grow to the middle stage and to the end: where the
-        solver starts. Returns the values at the end, and by how much φ grew indeed. StepFailure if a linear system is
+        `expected`, shape (2, nodes), are the extrapolated increments of φ to the middle stage and to the end, where the
+        solver starts. Returns the values at the end, and by how much φ grew. StepFailure if a linear system is
         not solved.
         """
         step, implicit = self._step, _GAMMA * self._step
         phi = values[0]
         inertia = self._equation.mass @ phi
         load1, rates1 = self._explicit(values)
-        guess = phi + foretold[0]
+        guess = phi + expected[0]
         middle = self._solve(inertia + implicit * (load1 + self._source), guess)
         load2, rates2 = self._explicit(np.vstack([middle, values[1:] + implicit * rates1]))
         linear = self._source - self._operator @ middle
         forces = _DELTA * load1 + (1.0 - _DELTA) * load2 + (1.0 - _GAMMA) * linear + _GAMMA * self._source
         # What was wrong with the stage is wrong with the end as well, and in proportion.
-        after = self._solve(inertia + step * forces, phi + foretold[1] + (middle - guess) / _GAMMA)
+        after = self._solve(inertia + step * forces, phi + expected[1] + (middle - guess) / _GAMMA)
         states = values[1:] + step * (_DELTA * rates1 + (1.0 - _DELTA) * rates2)
         return np.vstack([after, states]), np.stack([middle - phi, after - phi])
 

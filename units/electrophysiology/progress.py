@@ -1,4 +1,4 @@
-"""What a step of the monodomain equation moves, and what stops it."""
+"""The state that a step of the monodomain equation advances, and the failures of a step."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ SOLVER_ITERATIONS = 1000
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the equation stands.
+    """The present state of the monodomain equation.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ class Progress:
         In ms, shape (nodes,).
     increments:
         By how much φ grew from the begin of a substep to its middle stage, in the last substep and in the one before,
-        then the same from begin to end; shape (4, nodes). They foretell the next substep's, from which conjugate
-        gradients start.
+        then the same from begin to end; shape (4, nodes). Those of the next substep are extrapolated from them, as
+        the first guess of conjugate gradients.
     substep_ms:
         Length of the substep that the increments are of; 0 at the start.
     """
@@ -62,7 +62,7 @@ class Limits:
     def too_large(self, node: int, phi: float) -> StepFailure:
         """The failure at a node beyond what a cell reaches."""
         return StepFailure(
-            f"the dimensionless potential at node {node} is {phi:.3g}, which no cell reaches; lower "
+            f"the dimensionless potential at node {node} is {phi:.3g}, outside the range of a cell; lower "
             "longest_substep_ms, or check the parameters of the ionic model"
         )
 
@@ -70,6 +70,6 @@ class Limits:
 def unsolved() -> StepFailure:
     """The failure of conjugate gradients."""
     return StepFailure(
-        f"a step of the potential was not solved in {SOLVER_ITERATIONS} iterations of conjugate gradients; look for "
+        f"conjugate gradients did not converge in {SOLVER_ITERATIONS} iterations in a step of the potential; look for "
         "degenerate elements in the mesh or take a smaller longest_substep_ms"
     )

@@ -94,7 +94,7 @@ class Resolution:
     )
 
     def substeps(self, step_ms: float) -> int:
-        """Into how many equal substeps a communication step is divided; StepFailure for more than anybody waits for."""
+        """Into how many equal substeps a communication step is divided; StepFailure for more than can be computed."""
         count = step_ms / self.longest_substep_ms
         if count > _MOST_SUBSTEPS:
             raise StepFailure(
@@ -159,7 +159,10 @@ class Electrophysiology(Unit):
         for name, model in IONIC_MODELS.items():
             changed = [item.name for item in parameters_of(model) if self.get(item.name) != item.start]
             if name != chosen and changed:
-                yield f"{', '.join(changed)}: of the ionic model {name}, which is not chosen (ionic_model: {chosen})"
+                yield (
+                    f"parameters of the ionic model {name} have no effect, because ionic_model is {chosen}: "
+                    f"{', '.join(changed)}"
+                )
 
     def implementation(self) -> str:
         """What computes the steps, for a person: the compiled kernels and their instructions, or NumPy."""
@@ -201,8 +204,8 @@ class Electrophysiology(Unit):
         potential[stimulus.nodes(points)] = stimulus.stimulus_potential_mV
         if stimulus.stimulus_potential_mV <= self._lowest_potential:
             raise InvalidInput(
-                f"parameter 'stimulus_potential_mV' is {stimulus.stimulus_potential_mV:g}; the ionic model holds above "
-                f"{self._lowest_potential:g} mV only"
+                f"parameter 'stimulus_potential_mV' is {stimulus.stimulus_potential_mV:g}; the ionic model is valid "
+                f"only above {self._lowest_potential:g} mV"
             )
         already = potential >= self._scale.activation_potential_mV
         phi = (potential - self._scale.rest_potential_mV) / self._scale.potential_range_mV
@@ -255,7 +258,7 @@ class Electrophysiology(Unit):
         given = self._resolution.longest_substep_ms
         if given > longest_ms and self._resolution.explicit_limit == "enforced":
             raise InvalidInput(
-                f"parameter 'longest_substep_ms' is {given:g}; above {longest_ms:.3g} ms {reason}. Take less, or "
+                f"parameter 'longest_substep_ms' is {given:g}; above {longest_ms:.3g} ms {reason}. Lower it, or set "
                 "explicit_limit: ignored to see it fail"
             )
 

@@ -110,7 +110,7 @@ class FiberGenerator(Unit):
             mesh.boundary_nodes(*wall.endocardium, *wall.epicardium)
 
     def prepare(self) -> None:
-        """Nothing outlives the initial state."""
+        """Nothing has to be prepared."""
 
     def initial(self, inputs: State) -> dict[str, FloatArray]:
         """Fibre and sheet directions."""

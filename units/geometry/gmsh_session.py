@@ -1,4 +1,4 @@
-"""gmsh as a guest: one model at a time, quiet, deterministic, and nothing left behind."""
+"""Sessions of gmsh: one model at a time, quiet, deterministic, and nothing left behind."""
 
 import threading
 from collections.abc import Iterator

@@ -38,6 +38,6 @@ def build(name: str, size_mm: float) -> Mesh:
     if name not in GEOMETRIES:
         near = difflib.get_close_matches(name, GEOMETRIES, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else ""
-        raise InvalidInput(f"there is no geometry '{name}' (there is: {', '.join(sorted(GEOMETRIES))}){hint}")
+        raise InvalidInput(f"unknown geometry '{name}' (known: {', '.join(sorted(GEOMETRIES))}){hint}")
     shipped = SHIPPED.get((name, size_mm))
     return GEOMETRIES[name](size_mm) if shipped is None else read_mesh(shipped)

@@ -24,6 +24,6 @@ def check_size(size_mm: float, finest_mm: float, coarsest_mm: float, coefficient
         digits = math.log10(coefficient) - power * math.log10(size_mm)
         many = f", which makes about {10 ** (digits % 1):.1f}e{math.floor(digits)} elements"
     raise InvalidInput(
-        f"mesh_size_mm is {size_mm:g}{many}; expected {finest_mm:.3g} to {coarsest_mm:g} mm, from what a computer "
-        "holds to the smallest thickness"
+        f"mesh_size_mm is {size_mm:g}{many}; expected {finest_mm:.3g} to {coarsest_mm:g} mm: finer meshes do not fit "
+        "into a computer, and coarser elements are thicker than the thinnest part"
     )

@@ -71,7 +71,7 @@ def fallback() -> Iterator[str]:
     """A sentence for a person where NumPy has to stand in for kernels that were not compiled."""
     if not available() and os.environ.get(CHOICE) != WITHOUT:
         yield (
-            "the compiled kernels are missing, so that NumPy computes everything, several times slower; install a C "
+            "the compiled kernels are missing, so NumPy computes everything, several times slower; install a C "
             "compiler (gcc) and install the package again"
         )
 

@@ -138,7 +138,7 @@ class LocalMechanics(Differentiable):
         return frozen(np.zeros(self.variable(name).shape(self.mesh)))
 
     def stretch_response(self) -> Callable[[FloatArray], FloatArray]:
-        """How the stretch answers a small change of the active stress at present, its own stiffness left out.
+        """How the stretch responds to a small change of the active stress at present, its own stiffness left out.
 
         From changes of the active stress at the nodes in MPa, shape (nodes,), to changes of the stretch, (elements,).
         """

@@ -38,7 +38,7 @@ class LocalTension:
         self._mean = coo_matrix((shares, (elements, mesh.cells.ravel())), (mesh.elements, mesh.nodes)).tocsr()
 
     def tangent(self, squares: FloatArray, dependence: StretchDependence) -> "TensionTangent":
-        """How tensions answer small changes of the active stress at the equilibria `squares`, shape (elements, 3)."""
+        """How tensions respond to changes of the active stress at the equilibria `squares`, shape (elements, 3)."""
         if not dependence.stiffness.any():
             return TensionTangent(self._mean, None)
         slope = diags_array(self._equilibrium.stretch_by_tension(squares))

@@ -1,4 +1,4 @@
-"""How an equilibrium answers small changes of its loads: the whole derivative of the forces, solved to round-off.
+"""How an equilibrium responds to small changes of its loads: the whole derivative of the forces, solved to round-off.
 
     K δu + B δs + Σ g δp = 0,   δs = δs_a + w K_a A ∂λ/∂u δu
 
@@ -94,4 +94,4 @@ def _looped(loop: Callable[[FloatArray], FloatArray], right: FloatArray) -> Floa
 
 
 def _singular(reason: str) -> StepFailure:
-    return StepFailure(f"the equilibrium has no derivative by its loads there ({reason})")
+    return StepFailure(f"the equilibrium has no derivative with respect to its loads there ({reason})")

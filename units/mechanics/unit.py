@@ -83,7 +83,7 @@ class Mechanics(Differentiable):
             "active_stiffness",
             Causality.INPUT,
             "kPa",
-            "derivative of the active stress by the stretch",
+            "derivative of the active stress with respect to the stretch",
             Location.NODE,
             needs="stabilization",
         ),
@@ -285,7 +285,7 @@ class Mechanics(Differentiable):
         )
 
     def stretch_response(self) -> Callable[[FloatArray], FloatArray]:
-        """How the stretch answers a small change of the active stress at present, its own stiffness left out.
+        """How the stretch responds to a small change of the active stress at present, its own stiffness left out.
 
         From changes of the active stress at the nodes in MPa, shape (nodes,), to changes of the stretch, (elements,).
         """

@@ -1,4 +1,4 @@
-"""What averages values of elements around each node: one way for all who do it, so that they agree."""
+"""Averages of element values around each node, computed in one way for all units, so that they agree."""
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix

@@ -1,4 +1,4 @@
-"""The faces of simplices, counted: which bound the mesh, and where elements meet in no sound way."""
+"""The faces of simplices, counted: which bound the mesh, and where elements do not meet properly."""
 
 from dataclasses import dataclass
 

@@ -54,18 +54,18 @@ def read_mesh(path: Path, naming: Naming | None = None, scale: float = 1.0) -> M
 
 def _from_archive(path: Path, naming: Naming | None, scale: float) -> Mesh:
     if naming:
-        raise InvalidInput("an archive has its boundaries by their own names; remove scene.boundaries")
+        raise InvalidInput("a mesh archive names its own boundaries; remove scene.boundaries")
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
         if size > _ARCHIVE_BYTES + _ARCHIVE_RATIO * path.stat().st_size:
-            raise InvalidInput(f"unpacks to {size / 1e6:.0f} MB, far more than any mesh of its size; write it anew")
+            raise InvalidInput(f"unpacks to {size / 1e6:.0f} MB, far more than any mesh of its size; write it again")
         mesh = unpack_mesh(path)
     except InvalidInput:
         raise
     # What NumPy raises of an archive that is damaged, or none.
     except Exception as error:
-        raise InvalidInput(f"holds no mesh of this project ({error}); write it anew") from None
+        raise InvalidInput(f"holds no mesh of this project ({error}); write it again") from None
     return mesh if scale == 1.0 else Mesh(scale * mesh.points, mesh.cells, mesh.boundaries, mesh.notes)
 
 
@@ -97,14 +97,14 @@ def _cleaned(stored: StoredMesh, naming: Naming, scale: float) -> Mesh:
         )
     tetrahedra, points = stored.tetrahedra, stored.points
     if tetrahedra.min() < 0 or tetrahedra.max() >= len(points):
-        raise InvalidInput("has tetrahedra with nodes that it does not have; save the mesh whole")
+        raise InvalidInput("has tetrahedra whose nodes are missing from the file; save the whole mesh")
     notes = list(stored.notes)
     keys = row_keys(tetrahedra, len(points))
     _, first = np.unique(keys, return_index=True)
     if len(first) < len(tetrahedra):
         notes.append(
-            f"{len(tetrahedra) - len(first)} of {len(tetrahedra)} tetrahedra are listed twice, as overlapping volume "
-            "groups are; each was taken once"
+            f"{len(tetrahedra) - len(first)} of {len(tetrahedra)} tetrahedra are listed twice, as happens where volume "
+            "groups overlap; each was taken once"
         )
         tetrahedra = tetrahedra[np.sort(first)]
     used = np.unique(tetrahedra)
@@ -125,7 +125,7 @@ def _cleaned(stored: StoredMesh, naming: Naming, scale: float) -> Mesh:
     dropped = _strangers_inside(boundaries, cells, len(used))
     for name in dropped:
         what = f"{dropped[name]} faces that are not on the surface" if dropped[name] else "no triangles"
-        notes.append(f"the group '{name}' has {what}; no unit knows it, and it was left out")
+        notes.append(f"the group '{name}' has {what}; no unit knows it, so it was left out")
         del boundaries[name]
     return Mesh(points, cells, boundaries, tuple(notes))
 

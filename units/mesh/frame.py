@@ -107,15 +107,15 @@ def _sideways(mesh: Mesh) -> Iterator[str]:
     left = mesh.points[rim if len(rim) else mesh.boundary_nodes("lv_endocardium")].mean(axis=0)
     if np.hypot(*left[:2]) > _OFF_AXIS_MM:
         yield (
-            f"the left ventricle opens at X = {left[0]:.3g}, Y = {left[1]:.3g} mm; the stimulus and the probes take it "
-            "for centred on the Z axis"
+            f"the left ventricle opens at X = {left[0]:.3g}, Y = {left[1]:.3g} mm; the stimulus and the probes "
+            "assume that it is centred on the Z axis"
         )
     if "rv_endocardium" in mesh.boundaries:
         right = mesh.points[mesh.boundary_nodes("rv_endocardium")].mean(axis=0)
         if right[0] - left[0] < abs(right[1] - left[1]):
             yield (
                 f"the right ventricle lies in the direction X {right[0] - left[0]:+.3g}, Y {right[1] - left[1]:+.3g} "
-                "mm from the left one; the stimulus takes it for lying at positive X"
+                "mm from the left one; the stimulus assumes that it lies at positive X"
             )
 
 
@@ -132,8 +132,8 @@ def _coincident(mesh: Mesh) -> Iterator[str]:
     if len(pairs):
         where = np.round(points[pairs[0, 0]], 2).tolist()
         yield (
-            f"{len(pairs)} pairs of coincident nodes, the first near {where} mm: the tissue is torn there, for "
-            "elements on both sides do not share them; merge them if that is not meant (in gmsh: Coherence Mesh)"
+            f"{len(pairs)} pairs of coincident nodes, the first near {where} mm: the tissue is torn there, because "
+            "the elements on both sides do not share them; merge them unless this is intended (in gmsh: Coherence Mesh)"
         )
 
 

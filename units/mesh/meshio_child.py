@@ -27,7 +27,7 @@ def main(path: Path, folder: Path, seconds: int, size: int) -> None:
         found, arrays = _found(path)
     # meshio answers a file it cannot read with ReadError, SystemExit or whatever its parsers trip over.
     except (Exception, SystemExit) as error:
-        text = "no reader takes it" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
+        text = "no reader accepts the file" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
         found, arrays = {"error": text or type(error).__name__}, {}
     import numpy as np
 

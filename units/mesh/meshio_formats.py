@@ -18,7 +18,7 @@ from .stored import StoredMesh, UnreadableMesh, by_number
 
 _CHILD = Path(__file__).with_name("meshio_child.py")
 
-_REMEDY = "write it anew, best as gmsh's .msh"
+_REMEDY = "write it again, preferably in gmsh's format .msh"
 
 #: Seconds of a processor that any file gets, and more for each megabyte; so long in all at most, on a busy machine.
 _SECONDS, _SECONDS_PER_MB, _PATIENCE = 4.0, 2.0, 5.0
@@ -69,10 +69,10 @@ def _run_child(path: Path, folder: Path, size: int) -> None:
         code = None
     if code or not (folder / "found.json").is_file():
         reason = (
-            f"it gives up after {seconds:.0f} s"
+            f"it was stopped after {seconds:.0f} s"
             if code is None or code == -24
-            else f"it ends with signal {-code}"
+            else f"it was ended by signal {-code}"
             if code < 0
-            else f"it ends with exit code {code}"
+            else f"it ended with exit code {code}"
         )
         raise UnreadableMesh(f"meshio cannot read it as a mesh ({reason}); {_REMEDY}")

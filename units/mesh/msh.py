@@ -75,7 +75,7 @@ def _head(content: bytes) -> tuple[str, "type[_Numbers]", int, int]:
     words = content[line:end].decode("ascii", "replace").split() if 0 < line < end else []
     after = content.find(b"$EndMeshFormat", end)
     if len(words) != 3 or words[1] not in ("0", "1") or words[2] not in ("4", "8") or after < 0:
-        raise UnreadableMesh("has no sound $MeshFormat; save it from gmsh anew")
+        raise UnreadableMesh("has no valid section $MeshFormat; save it from gmsh again")
     numbers: type[_Numbers] = _Text
     if words[1] == "1":
         numbers = _LittleEndian if content[end + 1 : end + 5] == b"\1\0\0\0" else _BigEndian
@@ -110,7 +110,7 @@ class _Numbers(ABC):
 
     def short(self) -> UnreadableMesh:
         """What to raise where the section does not hold what it should."""
-        return UnreadableMesh(f"has no sound section ${self._name}, or ends within it; save it from gmsh anew")
+        return UnreadableMesh(f"has no valid section ${self._name}, or ends within it; save it from gmsh again")
 
 
 class _Text(_Numbers):
@@ -212,7 +212,7 @@ class _Blocks:
 def _nodes_of(kind: int) -> int:
     if kind not in _KINDS:
         raise UnreadableMesh(
-            f"holds elements that gmsh numbers {kind}, which are no linear tetrahedra; "
+            f"holds elements of gmsh's type {kind}, which are not linear tetrahedra; "
             "mesh the volume by tetrahedra, first order (Mesh.ElementOrder=1)"
         )
     return _KINDS[kind][1]
@@ -340,7 +340,7 @@ class _File:
                 at = section.at
             end = content.find(b"$End" + found[1], at)
             if end < 0:
-                raise UnreadableMesh(f"ends within ${name[:40]}; save it from gmsh anew")
+                raise UnreadableMesh(f"ends within ${name[:40]}; save it from gmsh again")
             found = _SECTION.search(content, end + len(found[1]) + 4)
 
     def _take(self, name: str, section: _Numbers, version: _Version2 | _Version4) -> None:
@@ -363,9 +363,9 @@ class _File:
         """What was read; UnreadableMesh where nodes or elements are missing."""
         blocks, tags = self._blocks, self._tags
         if blocks is None or tags is None:
-            raise UnreadableMesh("has no section $Nodes or no section $Elements; save the mesh, not the geometry alone")
+            raise UnreadableMesh("lacks the section $Nodes or $Elements; save the mesh, not only the geometry")
         if len(np.unique(tags)) < len(tags):
-            raise UnreadableMesh("gives two nodes the same number; save it from gmsh anew")
+            raise UnreadableMesh("gives two nodes the same number; save it from gmsh again")
         triangles = np.concatenate([np.empty((0, 3), dtype=np.int64), *blocks.nodes["triangle"]])
         tetrahedra = np.concatenate([np.empty((0, 4), dtype=np.int64), *blocks.nodes["tetra"]])
         groups = {number: np.concatenate(members) for number, members in blocks.groups.items()}
@@ -380,7 +380,7 @@ class _File:
         if blocks.grouped_tetrahedra and ungrouped > 0:
             notes.append(
                 f"{ungrouped} of {len(tetrahedra)} tetrahedra are in no physical group and are taken as tissue too; "
-                "save without them if they are none (Mesh.SaveAll=0)"
+                "save the mesh without them if they are not tissue (Mesh.SaveAll=0)"
             )
         return StoredMesh(
             self._points,

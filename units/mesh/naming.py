@@ -1,4 +1,4 @@
-"""Which faces of a mesh file are which boundary: by the names it gives them, or by names and numbers that are told."""
+"""Which faces of a mesh file form which boundary: by the names in the file, or as the scenario assigns them."""
 
 import difflib
 from collections.abc import Mapping, Sequence
@@ -37,7 +37,7 @@ def named_faces(stored: StoredMesh, naming: Naming) -> dict[str, IntArray]:
     for name in naming:
         if name not in BOUNDARIES:
             near = difflib.get_close_matches(name, BOUNDARIES, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(BOUNDARIES)}"
+            hint = f"did you mean '{near[0]}'?" if near else f"known boundaries: {', '.join(BOUNDARIES)}"
             raise InvalidInput(f"scene.boundaries.{name}: no unit knows a boundary of that name; {hint}")
     used = {group for groups in naming.values() for group in groups}
     told = {name: _gathered(stored, name, groups) for name, groups in naming.items()}
@@ -61,7 +61,7 @@ def _remedy(stored: StoredMesh) -> str:
         )
     if len(stored.triangles):
         return "save the surface triangles in physical groups (gmsh's formats do that), or with numbers as cell data"
-    return "it has no triangles at all; save those of the surface, too, in physical groups (gmsh's formats do that)"
+    return "it has no triangles at all; save those of the surface as well, in physical groups (gmsh's formats do that)"
 
 
 def _gathered(stored: StoredMesh, boundary: str, groups: Sequence[str | int]) -> IntArray:
@@ -73,7 +73,7 @@ def _gathered(stored: StoredMesh, boundary: str, groups: Sequence[str | int]) ->
                 hint = f"; did you mean '{near[0]}'?" if near else ""
                 raise InvalidInput(
                     f"scene.boundaries.{boundary}: there is no group of triangles named '{group}' "
-                    f"(there is: {listed(stored.named)}){hint}"
+                    f"(known: {listed(stored.named)}){hint}"
                 )
             found.append(stored.named[group])
         else:
@@ -88,7 +88,7 @@ def _with_number(stored: StoredMesh, boundary: str, number: int, groups: Sequenc
     if not holders:
         raise InvalidInput(
             f"scene.boundaries.{boundary}: no array of whole numbers on the triangles holds {sorted(numbers)} "
-            f"(there is: {_numbers(stored) or 'none'})"
+            f"(known: {_numbers(stored) or 'none'})"
         )
     first, *others = holders
     if any(not np.array_equal(holders[first][number], holders[other][number]) for other in others):

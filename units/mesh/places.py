@@ -66,7 +66,7 @@ def _nearest(mesh: Mesh, point: FloatArray) -> tuple[IntArray, FloatArray]:
     with np.errstate(over="ignore"):
         away = np.linalg.norm(mesh.points - point, axis=1)
     if not np.isfinite(away).all():
-        raise InvalidInput(f"the point {point.tolist()} lies outside the mesh, and nowhere near it")
+        raise InvalidInput(f"the point {point.tolist()} lies far outside the mesh")
     cells = mesh.cells[away[mesh.cells].min(axis=1) <= away.min() + _longest_edge(mesh)]
     closest, nodes, weights = np.inf, np.empty(0, dtype=np.int64), np.empty(0)
     for count in range(1, mesh.dimension + 2):
@@ -83,7 +83,7 @@ def _nearest(mesh: Mesh, point: FloatArray) -> tuple[IntArray, FloatArray]:
             if distance[best] < closest:
                 closest, nodes, weights = float(distance[best]), vertices[best], coordinates[best]
     if not np.isfinite(closest):
-        raise InvalidInput(f"the point {point.tolist()} lies outside the mesh, and nowhere near it")
+        raise InvalidInput(f"the point {point.tolist()} lies far outside the mesh")
     return nodes, weights
 
 

@@ -146,7 +146,7 @@ class Mesh:
             raise InvalidInput(
                 f"{inverted.sum()} of {len(cells)} elements are inverted or flat, the first is element {where} "
                 f"(volume {self.volumes[where]:.3g} mm³, near {np.round(self.centroids[where], 2).tolist()} mm); "
-                "reorder its nodes or mesh that place anew"
+                "reorder its nodes or mesh that place again"
             )
         unused = np.ones(len(points), dtype=bool)
         unused[cells] = False
@@ -185,7 +185,7 @@ class Mesh:
         shared = np.intersect1d(nodes, self.cells[part != part[element]])
         if len(shared):
             raise InvalidInput(
-                f"the mesh falls into {len(sizes)} parts that hang together by nodes only; the smallest, of "
+                f"the mesh falls into {len(sizes)} parts that are connected by nodes only; the smallest, of "
                 f"{sizes.min()} elements {where}, shares {len(shared)} nodes with the others, but no face. "
                 "Remove it or fuse the volumes before meshing"
             )
@@ -213,8 +213,8 @@ class Mesh:
             if not found.all():
                 raise InvalidInput(
                     f"{np.count_nonzero(~found)} of {len(faces)} faces of the boundary '{name}' are not on the surface "
-                    f"of the mesh, the first is {faces[_first(~found)].tolist()}; take those that lie between "
-                    "elements, or on nothing, out of the group (if a cavity is meshed too, save the wall's volume only)"
+                    f"of the mesh, the first is {faces[_first(~found)].tolist()}; remove those from the "
+                    "group (if a cavity is meshed too, save only the volume of the wall)"
                 )
             twice = repeated(place)
             if twice:

@@ -69,7 +69,7 @@ def _filled_from_neighbours(mesh: Mesh, gradient: FloatArray) -> FloatArray:
         found = np.linalg.norm(filled, axis=1) > threshold
         if not found.any():
             raise InvalidInput(
-                f"{flat.sum()} elements have no direction through the wall, nor has a neighbour; "
+                f"{flat.sum()} elements have no direction through the wall, and neither has any of their neighbours; "
                 "refine the mesh so that the wall has inner nodes"
             )
         where = np.flatnonzero(flat)[found]

@@ -116,8 +116,8 @@ def _check_open(mesh: Mesh) -> None:
     if "base" in mesh.boundaries and not len(np.setdiff1d(rim, mesh.boundary_nodes("base"))):
         raise InvalidInput(
             f"the boundary 'endocardium' ({len(inner)} faces) encloses a cavity, open at most at 'base' "
-            f"({len(mesh.boundary('base'))} faces), whose volume would be taken for 0; name it 'lv_endocardium', or, "
-            "of two ventricles, its parts 'lv_endocardium', 'rv_endocardium' and 'rv_septum' "
+            f"({len(mesh.boundary('base'))} faces), whose volume would be taken as 0; name it 'lv_endocardium', or, "
+            "with two ventricles, name its parts 'lv_endocardium', 'rv_endocardium' and 'rv_septum' "
             "(scene: {boundaries: {lv_endocardium: endocardium}})"
         )
 
@@ -169,6 +169,6 @@ def _check_complete(mesh: Mesh, faces: Mapping[str, IntArray], wall: Wall, names
         else "name that part of the surface by a physical group, or by scene.boundaries"
     )
     raise InvalidInput(
-        f"{len(left)} of {len(faces[''])} faces of the surface are none of {', '.join(names)}{where}{lacks}; give each "
-        f"to one of the boundaries: {remedy}"
+        f"{len(left)} of {len(faces[''])} faces of the surface are in none of {', '.join(names)}{where}{lacks}; give "
+        f"each to one of the boundaries: {remedy}"
     )

@@ -1,4 +1,4 @@
-"""The delay of the active stress by itself: by how much a step multiplies what the tension is off its target.
+"""The delay of the active stress by itself: how a step multiplies the distance of the tension from its target.
 
 Forward Euler multiplies it by 1 − ε H, so that the faster rate ε₁ limits the step H to 2/ε₁; the exact step by
 e^(−ε H), which is below 1 for any step. Between the rates ε₀ at rest and ε₁ in depolarised tissue, ε takes all values,

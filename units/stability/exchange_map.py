@@ -14,8 +14,8 @@ from ..arrays import FloatArray
 from ..errors import InvalidInput
 from .theory import Coupled
 
-#: Weights of the last values, the newest first, in the polynomial that foretells the next one, by its order.
-_FORETOLD = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))
+#: Weights of the last values, the newest first, in the polynomial that extrapolates to the next one, by its order.
+_EXTRAPOLATION = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,9 @@ def exchange_map(units: Mapping[str, LinearUnit], coupled: Coupled) -> FloatArra
 
     InvalidInput for an order of extrapolation beyond 2.
     """
-    if not 0 <= coupled.extrapolation < len(_FORETOLD):
+    if not 0 <= coupled.extrapolation < len(_EXTRAPOLATION):
         raise InvalidInput(f"the theory knows extrapolation of orders 0, 1 and 2, not {coupled.extrapolation}")
-    weights = _FORETOLD[coupled.extrapolation]
+    weights = _EXTRAPOLATION[coupled.extrapolation]
     state_count = sum(unit.states for unit in units.values())
     output_count = sum(unit.outputs for unit in units.values())
     size = state_count + len(weights) * output_count

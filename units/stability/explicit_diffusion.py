@@ -1,4 +1,4 @@
-"""Diffusion by an explicit step (`electrophysiology.explicit_step`): how long a substep the shortest wave bears.
+"""Diffusion by an explicit step (`electrophysiology.explicit_step`): the shortest wave limits the stable substep.
 
 Heun's method multiplies a mode that decays at the rate λ by |1 − λh + (λh)²/2|, which is below 1 where λh < 2. The
 fastest is the largest eigenvalue of (K + G) v = λ M v, computed on the scene's mesh (`electrophysiology.fastest_mode`),
@@ -51,7 +51,7 @@ class ExplicitDiffusion(Theory):
     def fastest_mode(self, coupled: Coupled) -> float:
         """λ_max in 1/ms; InvalidInput without a scene, or without fibres where diffusion follows them."""
         if coupled.mesh is None:
-            raise InvalidInput("the theory is of tissue in a scene; give the scenario one")
+            raise InvalidInput("the theory applies to tissue in a scene; add a `scene` to the scenario")
         setting, mesh = coupled.only("electrophysiology"), coupled.mesh()
         conduction, time_scale = setting.group(Conduction), setting.group(TimeScale)
         levels = setting.group(Resolution).refine

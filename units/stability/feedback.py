@@ -1,4 +1,4 @@
-"""Numbers that answer each other around a ring: the closed forms of loops with a gain, a delay, or a rate in them.
+"""Numbers that respond to each other in a ring: the closed forms of loops with a gain, a delay, or a rate in them.
 
 Of units `response`, each of which is fed by the one before it, in the order in which they step. With the ring's gain g,
 the product of all:
@@ -36,7 +36,7 @@ class Feedback(Theory):
         """See Theory; InvalidInput where fewer than two units are of that kind."""
         ring = [name for name, unit in coupled.units.items() if unit.kind == "response"]
         if len(ring) < 2:
-            raise InvalidInput(f"the theory is of two or more units 'response' in a ring, not of {len(ring)}")
+            raise InvalidInput(f"the theory applies to two or more units 'response' in a ring, not to {len(ring)}")
         before = dict(zip(ring, [ring[-1], *ring[:-1]], strict=True))
         units = {name: _unit(coupled.units[name], before[name], coupled) for name in ring}
         return spectral_radius(exchange_map(units, coupled))

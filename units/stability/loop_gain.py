@@ -1,4 +1,4 @@
-"""The loop of an active stress that depends on the stretch, and a mechanics that answers it at once.
+"""The loop of an active stress that depends on the stretch, and of mechanics, which responds without delay.
 
     δs_a = K_a δλ,   δλ = −δs_a/K_p:   an error comes back as g = −K_a/K_p times itself, however short the step
 
@@ -84,7 +84,7 @@ class LoopGain(Theory):
         if not dependence:
             return []
         if coupled.mesh is None:
-            raise InvalidInput("the theory of the loop gain needs a scene, on whose mesh the units are")
+            raise InvalidInput("the theory of the loop gain needs a `scene`, on whose mesh the units are solved")
         mesh = coupled.mesh()
         average = around_nodes(mesh.cells, mesh.volumes)
         moments: Sequence[Moment] = coupled.moments() or [_plateau(coupled, mesh)]
@@ -152,7 +152,7 @@ def _plateau(coupled: Coupled, mesh: Mesh) -> Moment:
         if number > _LEVELS and change <= _STILL:
             return {"active_stress": stress.get("active_stress"), "stretch": stretch, **directions}
     raise StepFailure(
-        f"active stress and mechanics find no plateau: the stretch still changes by {change:.2g} in a step after "
+        f"active stress and mechanics reach no plateau: the stretch still changes by {change:.2g} in a step after "
         f"{_MOST_STEPS} of them"
     )
 

@@ -1,4 +1,4 @@
-"""Where a front does not pass from element to element: on elements that are coarse against it, it stands still.
+"""Where a front stops between two elements, because the elements are coarse compared with its width.
 
 Without recovery the monodomain equation on a line is Nagumo's. Discretised, it has fronts that stand between two nodes
 as long as the diffusion between neighbours is too weak to lift the next node over its threshold (Keener 1987, SIAM J.
@@ -46,9 +46,9 @@ class PinnedFront(Theory):
         unit = coupled.only("electrophysiology")
         mesh = None if coupled.mesh is None else coupled.mesh()
         if mesh is None or mesh.dimension != 1:
-            raise InvalidInput("the theory pinned_front is of a strand; take a scene of lines")
+            raise InvalidInput("the theory pinned_front applies to a strand; choose a scene of line elements")
         if unit.parameters["ionic_model"] != AlievPanfilov.name:
-            raise InvalidInput("the theory pinned_front is of the ionic model aliev_panfilov")
+            raise InvalidInput("the theory pinned_front applies to the ionic model aliev_panfilov")
         conduction, ionic = unit.group(Conduction), unit.group(AlievPanfilov)
         time_scale = unit.group(TimeScale)
         along = conduction.diffusion_isotropic_mm2_per_ms + conduction.diffusion_anisotropic_mm2_per_ms

@@ -1,4 +1,4 @@
-"""The explicit step of the ionic model: how long a substep excited cells bear.
+"""The explicit step of the ionic model: the longest substep that is stable for excited cells.
 
 The ionic currents are taken explicitly by a method of second order with two stages (`electrophysiology.integration`),
 which multiplies a disturbance that decays at the rate λ by |1 − λh + (λh)²/2|: below 1 where λh < 2. The fastest decay
@@ -61,7 +61,7 @@ def fastest_decay(coupled: Coupled) -> float:
     """The fastest decay of the cells in 1/ms, where their time scale is smallest; InvalidInput without a scene."""
     setting = coupled.only("electrophysiology")
     if coupled.mesh is None:
-        raise InvalidInput("the theory is of tissue in a scene; give the scenario one")
+        raise InvalidInput("the theory applies to tissue in a scene; add a `scene` to the scenario")
     ionic = setting.group(IONIC_MODELS[setting.group(IonicChoice).ionic_model])
     time_scale = setting.group(TimeScale)
     clock = time_scale if ionic.dimensionless_time else time_scale.relative

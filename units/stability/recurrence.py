@@ -1,4 +1,4 @@
-"""How an error goes on from step to step in a loop of two units that answer at once.
+"""How an error develops from step to step in a loop of two units that respond without delay.
 
 With the loop's gain g an error e of what one unit is given comes back as g e. What is given at the end of a step is
 extrapolated from the ends of earlier ones, by a polynomial of order k: e = 1 − (1 − 1/z)^(k+1) of the newest where

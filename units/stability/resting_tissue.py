@@ -29,7 +29,7 @@ class RestingTissue(Theory):
         """G_s (λ − 1) over its largest value with a state of rest. InvalidInput for another ionic model."""
         unit = coupled.only("electrophysiology")
         if unit.parameters["ionic_model"] != AlievPanfilov.name:
-            raise InvalidInput("the theory resting_tissue is of the ionic model aliev_panfilov")
+            raise InvalidInput("the theory resting_tissue applies to the ionic model aliev_panfilov")
         ionic, conduction = unit.group(AlievPanfilov), unit.group(Conduction)
         beyond = float(coupled.only(Response.name).parameters["offset"])
 

@@ -1,4 +1,4 @@
-"""A unit as theories ask it: brought to its initial state, outside of any coupling."""
+"""A unit as theories query it: brought to its initial state, outside of any coupling."""
 
 from collections.abc import Mapping
 from typing import Any, TypeVar

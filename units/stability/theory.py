@@ -62,7 +62,7 @@ class Coupled:
         """The one unit of one of these kinds; InvalidInput where there is none, or several."""
         found = [unit for unit in self.units.values() if unit.kind in kinds]
         if len(found) != 1:
-            raise InvalidInput(f"the theory is of a scenario with one unit {' or '.join(kinds)}, not {len(found)}")
+            raise InvalidInput(f"the theory applies to a scenario with one unit {' or '.join(kinds)}, not {len(found)}")
         return found[0]
 
 

@@ -1,4 +1,4 @@
-"""The two-mass oscillator: how far its halves may step between exchanges (Busch 2012; Schweizer, Li & Lu 2015).
+"""The two-mass oscillator: how long its steps between exchanges may be (Busch 2012; Schweizer, Li & Lu 2015).
 
 Both are integrated exactly (`test_problems.mass`), so that the matrix from one exchange to the next is exact as well,
 and the coupling is stable as long as its spectral radius is below 1. A unit that has no coupling spring of its own is
@@ -42,11 +42,11 @@ def linear_masses(coupled: Coupled) -> dict[str, LinearUnit]:
     chosen = {name: unit.group(Suspension) for name, unit in coupled.units.items() if unit.kind in ("mass", "fmu")}
     if len(chosen) != 2:
         raise InvalidInput(
-            f"the theory is of two masses, units or FMUs with m, k, c, k_c and c_c, not of {len(chosen)}"
+            f"the theory applies to two masses, units or FMUs with m, k, c, k_c and c_c, not to {len(chosen)}"
         )
     free = [name for name, suspension in chosen.items() if not (suspension.k_c or suspension.c_c)]
     if len(free) == 2:
-        raise InvalidInput("the theory is of two masses that are coupled: give k_c or c_c to one of them, or to both")
+        raise InvalidInput("the theory applies to two coupled masses: give k_c or c_c to one of them, or to both")
     first, second = chosen
     other = {first: second, second: first}
     return {

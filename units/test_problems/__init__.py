@@ -1,4 +1,4 @@
-"""Units without a heart in them whose coupling is known in closed form: what schemes are tried on."""
+"""Units that are not of a heart, whose coupling is known in closed form: schemes are tested on them."""
 
 from .mass import Mass
 from .response import Response

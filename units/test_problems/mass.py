@@ -87,7 +87,7 @@ class Mass(Differentiable):
             "F",
             Causality.OUTPUT,
             "1",
-            "force of the coupling on what is at its other end",
+            "force of the coupling on its other end",
             depends_on=("F_in", "x_in", "v_in"),
             record=Record.VALUE,
         ),

@@ -37,7 +37,7 @@ class Law:
         0.0, "1/ms", "epsilon, rate at which the output follows; 0: without delay", at_least=0.0
     )
     rate_gain_ms: float = parameter(0.0, "ms", "rho, output per rate of the input, which is taken over a step")
-    disturbance: float = parameter(0.0, "1", "by how much the output is off at the start")
+    disturbance: float = parameter(0.0, "1", "error of the output at the start")
 
     def target(self, u: FloatArray) -> FloatArray:
         """g u + b."""

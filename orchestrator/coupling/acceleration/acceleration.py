@@ -1,4 +1,4 @@
-"""The seam between the iteration and its accelerations."""
+"""The protocol of accelerations: what the iteration calls."""
 
 from typing import Protocol
 
@@ -15,7 +15,7 @@ class Acceleration(Protocol):
         """A new step in time starts."""
 
     def forget(self) -> None:
-        """What was learned does not hold any more: the vectors are scaled anew from here on."""
+        """Forget what was learned, because the vectors are scaled differently from here on."""
 
     def next(self, iterate: Values, residual: Values) -> Values:
-        """The iterate after `iterate`."""
+        """The iterate that follows `iterate`."""

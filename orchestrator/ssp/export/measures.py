@@ -22,7 +22,7 @@ def definitions(maker: Any, used: Iterable[tuple[Component, set[str | None]]]) -
             if bases.setdefault(str(name), base) != base:
                 raise InputError(
                     f"the FMU {component.fmu.name} of '{component.name}' defines the unit of measure '{name}' "
-                    "otherwise than another FMU; a package has one definition"
+                    "differently from another FMU; a package can have only one definition"
                 )
     elements = [SSC.Unit({"name": name}, SSC.BaseUnit(base)) for name, base in sorted(bases.items())]
     return [maker.Units(*elements)] if elements else []

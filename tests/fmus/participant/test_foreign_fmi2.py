@@ -227,7 +227,7 @@ def test_names_that_fill_no_array_are_scalars(kind: str, names: set[str], tmp_pa
     [
         (1.0, r"it went 100% wrong, %s"),
         # PythonFMU's wrapper says of a step that returns False that it is the end.
-        (2.0, r"it asks for the end of the simulation \(fmi2Terminated\)"),
+        (2.0, r"it requested the end of the simulation \(fmi2Terminated\)"),
         (3.0, r"^only 50% sure %s$"),
         (5.0, r"^x{9000} the end$"),
     ],
@@ -361,11 +361,11 @@ def _file(kind: str, source: Path, folder: Path) -> Path:
     [
         ("missing", "no such FMU"),
         ("folder", "this folder has no modelDescription.xml"),
-        ("text", "no zip archive, or a damaged one"),
-        ("empty", "no zip archive, or a damaged one"),
-        ("cut", "no zip archive, or a damaged one"),
+        ("text", "not a zip archive, or it is damaged"),
+        ("empty", "not a zip archive, or it is damaged"),
+        ("cut", "not a zip archive, or it is damaged"),
         ("no description", "this archive has no modelDescription.xml"),
-        ("no XML", "modelDescription.xml: it is no well-formed XML"),
+        ("no XML", "modelDescription.xml: it is not well-formed XML"),
         ("FMI 1", "an FMU of FMI 1.0, which is not supported"),
         ("FMI 3 without binary", r"no library for this platform, x86_64-linux, only for linux64, win64"),
         ("model exchange", "an FMU for model exchange only"),

@@ -168,7 +168,7 @@ def test_wrong_parameters_of_others(name: str, value: Any, message: str, foreign
         (2.0, r"fmi3DoStep failed with status 2 \(discard\)\. The FMU logged no reason"),
         # In FMI 3.0 a message is no format: nothing in it is undone.
         (3.0, "^only 50%% sure %s$"),
-        (5.0, "it asks for the end of the simulation"),
+        (5.0, "it requested the end of the simulation"),
     ],
 )
 def test_steps_that_fail_in_other_peoples_fmus(mode: float, message: str, foreign: dict, ready: Join) -> None:

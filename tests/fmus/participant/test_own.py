@@ -89,7 +89,7 @@ def test_states_go_back_and_into_another_instance(cases: dict, packed: dict, joi
         participant.start(1e-3, 1e-3)
         np.testing.assert_array_equal(participant.get("potential"), after)
     one.free(saved)
-    with pytest.raises(ParticipantError, match="these bytes are no state"):
+    with pytest.raises(ParticipantError, match="these bytes are not a state"):
         other.unpack(stored[:100])
 
 

@@ -68,14 +68,14 @@ _OF_FMI_2: dict[str, tuple[Mistake, str]] = {
 }
 
 _OF_FMI_3: dict[str, tuple[Mistake, str]] = {
-    "too few values": (lambda d: d.set("potential", [1.0]), "1 values were given or asked for; 'potential' have 16"),
+    "too few values": (lambda d: d.set("potential", [1.0]), "1 values were given or requested; 'potential' have 16"),
     "too many values": (
         lambda d: d.set("potential", [1.0] * 17),
-        "17 values were given or asked for; 'potential' have 16",
+        "17 values were given or requested; 'potential' have 16",
     ),
     "reading too many": (
         lambda d: d.read("Float64", d.references("potential"), 17),
-        "17 values were given or asked for; 'potential' have 16",
+        "17 values were given or requested; 'potential' have 16",
     ),
     "the time": (lambda d: d.set("time", [1.0]), "'time'"),
     "too many texts": (

@@ -36,10 +36,10 @@ def _unchanged(driver: Any, time: float, size: float, message: str) -> None:
 @pytest.mark.parametrize("size", [0.0, -0.0, -0.1, _NAN, _INF, -_INF])
 def test_a_step_has_a_size(size: float, make: Make) -> None:
     driver, other = _ready(make), _ready(make)
-    _unchanged(driver, 0.0, size, "its size above 0")
+    _unchanged(driver, 0.0, size, "the size above 0")
     for one in (driver, other):
         assert one.step(0.0, 0.1) == 0
-    _unchanged(driver, 0.1, size, "its size above 0")
+    _unchanged(driver, 0.1, size, "the size above 0")
     for one in (driver, other):
         assert one.step(0.1, 0.1) == 0
     assert driver.packed() == other.packed()
@@ -52,11 +52,11 @@ def test_a_time_is_a_number(time: float, make: Make) -> None:
 
 def test_steps_follow_one_another(make: Make) -> None:
     driver = _ready(make)
-    _unchanged(driver, 0.1, 0.1, "the instance has come to 0 s")
+    _unchanged(driver, 0.1, 0.1, "the instance is at 0 s")
     assert driver.step(0.0, 0.1) == 0
     # Again, back, with an overlap, and with a gap.
     for time in (0.0, -0.1, 0.05, 0.2):
-        _unchanged(driver, time, 0.1, "the instance has come to 0.1 s")
+        _unchanged(driver, time, 0.1, "the instance is at 0.1 s")
     assert driver.step(0.1, 0.1) == 0
 
 
@@ -138,6 +138,6 @@ def test_units_with_a_memory_start_at_zero(make: Make, cases: dict) -> None:
     for name, values in cases["mechanics"].first().items():
         driver.set(name, values)
     assert driver.leave() == 0
-    _unchanged(driver, 0.0, 0.1, "the instance has come to 0.5 s")
+    _unchanged(driver, 0.0, 0.1, "the instance is at 0.5 s")
     assert driver.step(0.5, 0.1) == 0
     assert driver.reached() == 0.6

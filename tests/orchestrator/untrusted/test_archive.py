@@ -76,8 +76,8 @@ def test_two_members_of_one_name_are_refused(tmp_path: Path) -> None:
     """What is looked at could be another content than what is run."""
     with pytest.warns(UserWarning, match="Duplicate"):
         path = packed(tmp_path / "a.fmu", ("x", b"1"), ("x", b"2"))
-    assert "stands twice" in refused(path, tmp_path / "out")
-    assert "stands twice" in refused(packed(tmp_path / "b.fmu", ("x", b"1"), ("./x", b"2")), tmp_path / "out2")
+    assert "occurs twice" in refused(path, tmp_path / "out")
+    assert "occurs twice" in refused(packed(tmp_path / "b.fmu", ("x", b"1"), ("./x", b"2")), tmp_path / "out2")
     assert "cannot be unpacked" in refused(packed(tmp_path / "c.fmu", ("x", b"1"), ("x/y", b"2")), tmp_path / "out3")
     # Public FMUs have the same file twice, from each of the tools that had a hand in them.
     with pytest.warns(UserWarning, match="Duplicate"):

@@ -46,9 +46,11 @@ def test_a_run_with_a_budget_has_that_of_its_own_numbers(strand: Path, tmp_path:
     # By FMUs, while the budget calls the units directly.
     out = tmp_path / "run"
     by = ("--participants", "fmu", "--fmu-dir", tmp_path / "fmus")
-    ended = cosim("run", strand, *_SHORT, *by, "--output", out, "--no-figures", "--error-budget")
+    ended = cosim("run", strand, *_SHORT, *by, "--output", out, "--report", "--error-budget")
     assert ended.code == 0, ended.err
     assert ended.out.index("results in") < ended.out.index("± ")
+    # The page of the run, which was there before, has the errors too.
+    assert "±" in (out / "report.html").read_text(encoding="utf-8")
     values = {row["quantity"]: float(row["value"]) for row in _rows(out)}
     assert values == headlines(StoredRun(out))
     direct = cosim("errors", strand, *_SHORT, "--output", tmp_path / "direct")

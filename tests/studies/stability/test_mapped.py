@@ -92,7 +92,7 @@ def test_what_a_theory_is_told_is_what_the_scenario_has(limit_study: Path, theor
             "    vary:", "    set: {coupling.scheme: jacobi, coupling.order: [second, first]}\n    vary:"
         ).replace("theory: masses", "theory: told")
     )
-    with pytest.raises(InputError, match=r"theory: there is no theory 'told'.*masses"):
+    with pytest.raises(InputError, match=r"theory: unknown theory 'told'.*masses"):
         mapped(limit_study)
     limit_study.write_text(limit_study.read_text().replace("theory: told", "theory: masses"))
     with pytest.raises(InputError) as problem:

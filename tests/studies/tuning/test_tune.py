@@ -115,7 +115,7 @@ def test_a_study_is_the_whole_choice_and_what_was_run_of_it_is_not_run_again(
         ((), ["--tolerance is missing"]),
         (("--tolerance", "activation=1"), ["activation", "did you mean 'activation_ms'"]),
         (("--tolerance", "activation_ms"), ["activation_ms", "measure=limit"]),
-        (("--tolerance", "activation_ms=fast"), ["'fast' is no number"]),
+        (("--tolerance", "activation_ms=fast"), ["'fast' is not a number"]),
         (("--tolerance", "activation_ms=-1"), ["above 0"]),
         (("--tolerance", "activation_ms=nan"), ["finite number above 0"]),
         (("--tolerance", "activation_ms=1", "--tolerance", "activation_ms=2"), ["keep one of the two"]),

@@ -121,5 +121,5 @@ def test_implicit_diffusion_leaves_the_limit_of_the_cells(tissue: Any) -> None:
 
 def test_a_scenario_without_a_mesh_is_refused(setting: Any) -> None:
     units = {"fibers": setting("fiber_generator"), "wave": setting("electrophysiology", diffusion_step="explicit")}
-    with pytest.raises(InvalidInput, match="give the scenario one"):
+    with pytest.raises(InvalidInput, match="add a `scene` to the scenario"):
         ExplicitDiffusion().amplification(Coupled(units, False, 1.0))

@@ -96,5 +96,5 @@ def test_a_ring_of_three_delays_the_error_by_three_exchanges_under_jacobi(settin
 
 
 def test_a_scenario_without_a_ring_is_refused(setting: Any) -> None:
-    with pytest.raises(InvalidInput, match="in a ring, not of 1"):
+    with pytest.raises(InvalidInput, match="in a ring, not to 1"):
         Feedback().amplification(Coupled({"a": setting("response"), "b": setting("mass")}, False, 1.0))

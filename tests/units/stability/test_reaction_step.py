@@ -122,5 +122,5 @@ def test_the_substep_counts_and_not_the_communication_step(point: Mesh, setting:
 def test_a_scenario_without_tissue_is_refused(setting: Any) -> None:
     with pytest.raises(InvalidInput, match="one unit electrophysiology"):
         ReactionStep().amplification(Coupled({"a": setting("mass")}, False, 1.0))
-    with pytest.raises(InvalidInput, match="give the scenario one"):
+    with pytest.raises(InvalidInput, match="add a `scene` to the scenario"):
         ReactionStep().amplification(Coupled({"a": setting("electrophysiology")}, False, 1.0))

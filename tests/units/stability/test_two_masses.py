@@ -188,7 +188,7 @@ def test_foreign_masses_have_the_same_theory(order: int, bodies: dict[str, Path]
 
 def test_what_the_theory_does_not_fit_is_refused() -> None:
     free, held = Setting("mass", {"k": 1.0}), Setting("mass", {"k": 1.0, "k_c": 1.0})
-    with pytest.raises(InvalidInput, match=r"of two masses, .* not of 1"):
+    with pytest.raises(InvalidInput, match=r"applies to two masses, .* not to 1"):
         TwoMasses().amplification(Coupled({"a": held}, False, 1.0))
     with pytest.raises(InvalidInput, match="give k_c or c_c"):
         TwoMasses().amplification(Coupled({"a": free, "b": free}, False, 1.0))

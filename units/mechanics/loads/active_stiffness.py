@@ -74,7 +74,7 @@ class ActiveStiffness:
         return np.asarray(of.stiffness * (self.average @ (stretch - of.reference)))
 
     def stiffness(self, displacement: FloatArray, of: StretchDependence) -> FloatArray:
-        """The fibres' answer w K_a/λ in N/mm, where it is positive, shape (elements, n, 3, n, 3) of n element nodes."""
+        """The fibres' response w K_a/λ in N/mm, where it is positive, shape (elements, n, 3, n, 3); n element nodes."""
         fiber = self._deformed(displacement)
         stretch = _length(fiber).mean(axis=1)
         at_points = of.stiffness[self._nodes[:, :4]] @ self._shares.T

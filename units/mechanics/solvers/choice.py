@@ -18,7 +18,7 @@ MOST_FACTORISED = {"supernodal": 500_000, "superlu": 100_000}
 
 @dataclass(frozen=True)
 class LinearSolver:
-    """What solves with the stiffness."""
+    """The linear solver of the stiffness."""
 
     linear_solver: str = parameter(
         "auto",
@@ -45,7 +45,7 @@ class LinearSolver:
         """A sentence for a person where SciPy has to stand in for a faster package."""
         if self.linear_solver == "auto" and not _installed("rslab"):
             yield (
-                "rslab is not installed, so that SciPy's SuperLU factorises the stiffness, several times slower; "
+                "rslab is not installed, so SciPy's SuperLU factorises the stiffness, several times slower; "
                 "install it (pip install rslab)"
             )
 

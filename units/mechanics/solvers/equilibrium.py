@@ -1,4 +1,4 @@
-"""Static equilibrium of a solid: three methods, each slower and surer than the one before.
+"""Static equilibrium of a solid: three methods, each slower and more robust than the one before.
 
 A quasi-Newton method with factors of an earlier stiffness; Newton's method with a line search; and that again, with the
 loads raised in increments. Without these safeguards it is Newton's method alone.
@@ -105,8 +105,8 @@ class Equilibrium:
                     stresses = loads[: self._loads]
                     largest = 1000.0 * stresses[np.abs(stresses).argmax()]
                     raise StepFailure(
-                        f"no equilibrium beyond {100.0 * done:.0f} % of the change of the loads (the largest is "
-                        f"{largest:.4g} kPa): {failure}. Load steps down to 1/{2**_LOAD_HALVINGS} were tried. Take "
+                        f"no equilibrium was found beyond {100.0 * done:.0f} % of the change of the loads (the largest "
+                        f"is {largest:.4g} kPa): {failure}. Load steps down to 1/{2**_LOAD_HALVINGS} were tried. Take "
                         "shorter communication steps, refine the mesh at that element, or check the active stress and "
                         "the pressures"
                     ) from None

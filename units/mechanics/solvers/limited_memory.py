@@ -1,4 +1,4 @@
-"""The limited-memory BFGS method around a preconditioner: what a stiffness that has become stale still is good for.
+"""The limited-memory BFGS method with a preconditioner, such as the stiffness of an earlier deformation.
 
 Source: Nocedal & Wright 2006, algorithm 7.4.
 """

@@ -1,4 +1,4 @@
-"""Newton's method with a line search: slow, and it gets there from afar."""
+"""Newton's method with a line search: slow, but it converges from far away."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ class Newton:
         """The equilibrium reached from `displacement`, shape (nodes, 3), under `loads`; NotConverged if none is."""
         energy, residual = self._solid.energy_and_residual(displacement, loads)
         if not np.isfinite(energy):
-            raise NotConverged("an element is inverted where the iteration starts")
+            raise NotConverged("an element is inverted at the start of the iteration")
         for iteration in range(self._iterations + 1):
             if largest(residual) <= self._limit:
                 return Solution(frozen(displacement), factored)

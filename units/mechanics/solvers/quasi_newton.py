@@ -29,7 +29,7 @@ class QuasiNewton:
         """The equilibrium near `displacement`, shape (nodes, 3), under `loads`; NotConverged if none is found."""
         residual = self._solid.residual(displacement, loads)
         if residual is None:
-            raise NotConverged("an element is inverted where the iteration starts")
+            raise NotConverged("an element is inverted at the start of the iteration")
         self._memory.forget()
         size, since = largest(residual), 0
         for _ in range(_MOST_ITERATIONS):
