@@ -8,12 +8,14 @@ from types import TracebackType
 
 import dask
 from distributed import Client, LocalCluster
-from distributed.utils import get_mp_context
 
 from .errors import InputError
 
 #: How long a scheduler may take to answer, and Dask to close, in seconds.
 _ANSWER_S, _CLOSING_S = 10.0, 5.0
+
+#: Whether worker processes are forked. Elsewhere a process that has loaded the system's libraries may not survive that.
+_FORKED = sys.platform == "linux"
 
 #: A worker that dies costs what it was doing, which is not tried again; one that works for long has not died. Nobody
 #: looks at what its threads do every 10 ms: that takes the interpreter away from what is timed.
@@ -22,8 +24,7 @@ _SETTINGS = {
     "distributed.scheduler.worker-ttl": None,
     "distributed.worker.profile.enabled": False,
     # Worker processes are forked from one process that has imported what they need, which takes seconds, once for all.
-    # Elsewhere than on Linux a process that has loaded the system's libraries cannot be relied on to fork.
-    "distributed.worker.multiprocessing-method": "forkserver" if sys.platform == "linux" else "spawn",
+    "distributed.worker.multiprocessing-method": "forkserver" if _FORKED else "spawn",
 }
 
 #: What that process imports: Dask, and all that a run needs.
@@ -42,9 +43,8 @@ class Cluster:
         try:
             if self.is_ours:
                 with dask.config.set(_SETTINGS):
-                    # After Dask has set what it preloads itself, which is less.
-                    if (context := get_mp_context()).get_start_method() == "forkserver":
-                        context.set_forkserver_preload(_PRELOADED)
+                    if _FORKED and where == "processes":
+                        _start_fork_server()
                     self._own = LocalCluster(
                         n_workers=count,
                         threads_per_worker=1,
@@ -90,3 +90,21 @@ class Cluster:
         if self._own is not None:
             with suppress(TimeoutError, OSError):
                 self._own.close(timeout=_CLOSING_S)
+
+
+def _start_fork_server() -> None:
+    """Start the process that workers are forked from, unless it is there."""
+    # Not every system has it.
+    from multiprocessing import forkserver
+
+    # What Dask sets for its workers counts when libraries are imported. Without PYTHONSAFEPATH, a file of a library's
+    # name in the folder that we are in would be taken for that library.
+    wanted = dask.config.get("distributed.nanny.pre-spawn-environ") | {"PYTHONSAFEPATH": 1}
+    added = {key: str(value) for key, value in wanted.items() if value is not None and key not in os.environ}
+    os.environ.update(added)
+    try:
+        forkserver.set_forkserver_preload(_PRELOADED)
+        forkserver.ensure_running()
+    finally:
+        for key in added:
+            del os.environ[key]

@@ -184,6 +184,22 @@ def test_workers_whose_work_is_done_are_not_started_again(monkeypatch: pytest.Mo
     assert not started
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="worker processes are forked on Linux only")
+def test_a_file_that_lies_about_is_not_taken_for_a_library(tmp_path: Path) -> None:
+    (tmp_path / "colorsys.py").write_text("open('taken', 'w').close()")
+    text = (
+        "import multiprocessing; from cardiac_cosim.orchestrator import cluster\n"
+        "cluster._PRELOADED = ['colorsys']\n"
+        "cluster._start_fork_server()\n"
+        # The server has imported what it was to before it forks.
+        "process = multiprocessing.get_context('forkserver').Process(target=print, args=('forked',))\n"
+        "process.start(); process.join()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", text], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.returncode) == ("forked\n", 0), done.stderr
+    assert not (tmp_path / "taken").exists()
+
+
 def test_when_a_worker_is_killed_the_results_so_far_are_readable_and_the_run_can_go_on(
     small_scenario: Path, tmp_path: Path
 ) -> None:
