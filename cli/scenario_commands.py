@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..orchestrator.errors import InputError, Interrupted
+from ..orchestrator.errors import InputError, Interrupted, RunError
 from ..orchestrator.results.names import PAGE
 from ..orchestrator.scenario import Scenario, parsed_assignments
 from .exit_codes import INTERRUPTED
@@ -75,6 +75,11 @@ def run(
                 rest = "; continue with --resume" if error.resumable else "; no checkpoint was kept to continue from"
                 print(f"interrupted; the results so far are in {folder}{rest}", file=sys.stderr)
                 raise typer.Exit(INTERRUPTED + error.signal) from None
+            except RunError:
+                # What failed is said last.
+                if (folder / PAGE).is_file():
+                    manner.note(f"to look at the results up to the failure, open {folder / PAGE} in a browser")
+                raise
         for warning in outcome.warnings:
             _warn(warning)
         _report(scenario, outcome.folder, outcome.summary, manner)

@@ -32,6 +32,19 @@ def test_a_run_says_where_its_page_is_and_leaves_none_of_an_earlier_run(
     assert not page.exists()
 
 
+def test_a_run_that_fails_says_where_its_page_is(
+    small_scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    iterate = "coupling.iterate={max_iterations: 1, converge: {stretch: {relative: 1e-9}}}"
+    out = tmp_path / "out"
+    arguments = ["run", small_scenario, "--output", out, "--set", "run.stop_ms=5", "--set", iterate, "--no-figures"]
+    assert _cosim(monkeypatch, *arguments) == 3
+    told = capsys.readouterr().err
+    assert f"to look at the results up to the failure, open {out / 'report.html'} in a browser" in told
+    assert told.rstrip().rpartition("\n")[2].startswith("failed: ")
+    assert "The run failed" in (out / "report.html").read_text()
+
+
 def test_page_and_figures_are_made_again(
     run_of: RunOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
