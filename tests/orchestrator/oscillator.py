@@ -124,18 +124,18 @@ class Oscillator:
         def advance(z: np.ndarray) -> np.ndarray:
             one, two, force, before_one, before_two, before_force = z[:2], z[2:4], z[4], z[5:7], z[7:9], z[9]
 
-            def foretold(now: Any, before: Any) -> Any:
+            def extrapolated(now: Any, before: Any) -> Any:
                 return now if order == 0 else 2.0 * now - before
 
             # Mass 1 goes first and knows nothing of the step's end.
             if split == "FD":
-                ends = foretold(force, before_force)
+                ends = extrapolated(force, before_force)
                 loads = (ends if order == 0 else force, ends)
             else:
-                ends = foretold(two, before_two)
+                ends = extrapolated(two, before_two)
                 loads = (first.load(ends if order == 0 else two), first.load(ends))
             new_one = first.step(one, *loads, size)
-            seen = new_one if scheme == "gauss-seidel" else foretold(one, before_one)
+            seen = new_one if scheme == "gauss-seidel" else extrapolated(one, before_one)
             new_two = second.step(two, second.load(seen if order == 0 else one), second.load(seen), size)
             return np.array([*new_one, *new_two, self._force(new_two, seen), *one, *two, force])
 

@@ -264,7 +264,7 @@ _SETS: dict[str, tuple[list[str], list[str]]] = {
         ["units of measure differ, kPa -> mV"],
     ),
     "order without mechanics": (["coupling.order=[electrophysiology, active_stress]"], ["coupling.order: mechanics"]),
-    "order of strangers": (["coupling.order=[heart]"], ["coupling.order", "unknown unit 'heart'"]),
+    "order of unknown units": (["coupling.order=[heart]"], ["coupling.order", "unknown unit 'heart'"]),
     "probe on the moon": (["output.probes_mm.moon=[0, 0, 9999]"], ["output.probes_mm.moon", "nearest node"]),
     "mesh that is not there": (["scene.mesh=nowhere.msh"], ["scene", "nowhere.msh: no such mesh file"]),
     "mesh that is a folder": (["scene.mesh=."], ["scene", "no such mesh file"]),

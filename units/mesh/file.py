@@ -122,7 +122,7 @@ def _cleaned(stored: StoredMesh, naming: Naming, scale: float) -> Mesh:
         if found:
             notes.append(f"{found} faces of the boundary '{name}' are listed twice; each was taken once")
         boundaries[name] = faces
-    dropped = _strangers_inside(boundaries, cells, len(used))
+    dropped = _other_groups_inside(boundaries, cells, len(used))
     for name in dropped:
         what = f"{dropped[name]} faces that are not on the surface" if dropped[name] else "no triangles"
         notes.append(f"the group '{name}' has {what}; no unit knows it, so it was left out")
@@ -137,14 +137,14 @@ def _once(faces: IntArray, nodes: int) -> tuple[IntArray, int]:
     return faces[np.sort(first)], len(faces) - len(first)
 
 
-def _strangers_inside(boundaries: dict[str, IntArray], cells: IntArray, nodes: int) -> dict[str, int]:
+def _other_groups_inside(boundaries: dict[str, IntArray], cells: IntArray, nodes: int) -> dict[str, int]:
     """How many faces are not on the surface, of each group that no unit knows and that has such, or no faces at all."""
-    strangers = [name for name in boundaries if name not in BOUNDARIES]
-    if not strangers:
+    others = [name for name in boundaries if name not in BOUNDARIES]
+    if not others:
         return {}
     surface = faces_of(cells, nodes).surface
     inside = {}
-    for name in strangers:
+    for name in others:
         keys = row_keys(np.concatenate([surface, boundaries[name]]) + 1, nodes + 1)
         count = int(np.count_nonzero(~np.isin(keys[len(surface) :], keys[: len(surface)])))
         if count or not len(boundaries[name]):

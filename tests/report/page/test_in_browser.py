@@ -143,7 +143,7 @@ def test_one_looks_inside_and_chooses_what_is_seen(run_of: RunOf, look: LookAt) 
     assert {tuple(row) for row in ghost} <= {tuple(row) for row in at_rest.astype(np.float32)}
 
 
-def test_names_of_strangers_are_texts(run_of: RunOf, look: LookAt, tmp_path: Path) -> None:
+def test_names_from_others_are_texts(run_of: RunOf, look: LookAt, tmp_path: Path) -> None:
     """An FMU that somebody made names columns and writes messages."""
     strange = "</script></title><script>stranger = 1</script><b>&amp;"
     folder = tmp_path / "strange"
