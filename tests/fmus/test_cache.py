@@ -19,5 +19,5 @@ def test_the_cache_keeps_both_versions_apart(tiny: Mesh, tmp_path: Path, monkeyp
     assert before[0] != before[1]
     monkeypatch.setattr(build, "version", lambda name: f"another {name}")
     assert not set(before) & {build.fingerprint(unit, tiny, fmi) for fmi in (2, 3)}
-    with pytest.raises(ValueError, match="FMI 2 and 3, not 1"):
+    with pytest.raises(ValueError, match="FMI 2 and 3, not for 1"):
         cached_fmu(unit, tiny, tmp_path, fmi=1)

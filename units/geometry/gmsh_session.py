@@ -1,5 +1,7 @@
 """Sessions of gmsh: one model at a time, quiet, deterministic, and nothing left behind."""
 
+import ctypes
+import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -70,12 +72,31 @@ def gmsh_model(size_mm: float) -> Iterator[ModuleType]:
             return
         # Not interruptible: signal handlers can only be set in the main thread. No configuration files: the mesh must
         # not depend on the user's.
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        with _broken_pipes_as_before():
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
         try:
             _set_up(gmsh, size_mm)
             yield gmsh
         finally:
             gmsh.finalize()
+
+
+@contextmanager
+def _broken_pipes_as_before() -> Iterator[None]:
+    """Give SIGPIPE back its meaning: gmsh has it end the process, where Python makes an error of a broken pipe.
+
+    By the C library, for Python sets signals in its main thread only, and meshes are made in others too.
+    """
+    if not hasattr(signal, "SIGPIPE"):
+        yield
+        return
+    set_signal = ctypes.CDLL(None).signal
+    set_signal.argtypes, set_signal.restype = [ctypes.c_int, ctypes.c_void_p], ctypes.c_void_p
+    before = set_signal(signal.SIGPIPE, int(signal.SIG_IGN))
+    try:
+        yield
+    finally:
+        set_signal(signal.SIGPIPE, before)
 
 
 def _set_up(gmsh: ModuleType, size_mm: float) -> None:

@@ -30,8 +30,8 @@ def wall_outputs(depends_on: tuple[str, ...]) -> tuple[Variable, ...]:
     texts = {
         _TWIST: (
             "deg",
-            "rotation of the apical third of the left ventricle's wall less that of the basal third, counterclockwise "
-            "as seen from the apex; 0 without a left ventricle",
+            "rotation of the left ventricle's apex less that of its base, counterclockwise as seen from the apex; 0 "
+            "without one",
         )
     }
     texts |= {

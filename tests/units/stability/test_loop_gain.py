@@ -109,7 +109,7 @@ def test_no_loop_has_no_gain(cell: Mesh, coupled: Any) -> None:
 
 
 def test_what_the_theory_does_not_fit_is_refused(cell: Mesh, coupled: Any) -> None:
-    with pytest.raises(InvalidInput, match="needs a scene"):
+    with pytest.raises(InvalidInput, match="needs a `scene`"):
         LoopGain().amplification(coupled(None, "local_mechanics", 3.0))
     system = coupled(cell, "local_mechanics", 3.0)
     alone = type(system)({"tension": system.units["tension"]}, False, 1.0, mesh=system.mesh)
