@@ -249,5 +249,8 @@ def resumable(folder: Path) -> Iterator[None]:
     try:
         yield
     except Interrupted as error:
-        print(f"interrupted; what is finished is in {folder}, and the same command goes on from there", file=sys.stderr)
+        print(
+            f"interrupted; the finished runs are in {folder}, and the same command continues from there",
+            file=sys.stderr,
+        )
         raise typer.Exit(INTERRUPTED + error.signal) from None

@@ -85,7 +85,7 @@ class Scenario(Section):
             self._check_count("run.stop_ms", self.run.stop_ms, self.run.stop_ms / adaptive.min_ms, "adaptive.min_ms")
             if not is_whole(steps):
                 raise ValueError(
-                    f"`run.stop_ms` ({self.run.stop_ms:g} ms) is no whole number of `output.every_ms` "
+                    f"`run.stop_ms` ({self.run.stop_ms:g} ms) is not a whole number of `output.every_ms` "
                     f"({self.output.every_ms:g} ms), which `coupling.adaptive` needs; change one of them"
                 )
             return self
@@ -94,7 +94,7 @@ class Scenario(Section):
             self._check_count(key, time, time / step, "step_ms")
             if not is_whole(time / step):
                 raise ValueError(
-                    f"`{key}` ({time:g} ms) is no whole number of steps of `coupling.step_ms` "
+                    f"`{key}` ({time:g} ms) is not a whole number of steps of `coupling.step_ms` "
                     f"({step:g} ms); change one of them"
                 )
         return self

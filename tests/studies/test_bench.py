@@ -100,7 +100,7 @@ def test_stopped_by_a_signal_it_says_how_to_go_on(study: Path, tmp_path: Path) -
     _, told = process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGINT
     assert told.count("\n") == 1
-    assert "the same command goes on from there" in told
+    assert "the same command continues from there" in told
 
 
 def test_a_folder_belongs_to_one_study_at_a_time(study: Path, tmp_path: Path, cosim: Callable[..., Any]) -> None:

@@ -84,7 +84,7 @@ def test_settings_that_cannot_stand_together_are_a_point_with_a_reason(study: Pa
     study.write_text(study.read_text().replace("[0.5, 1, 2, 4]", "[0.5, 3]"))
     first, second = plan_study(study).lines["held"]
     assert (first.point is not None, second.point) == (True, None)
-    assert second.reason.startswith("`run.stop_ms` (40 ms) is no whole number of steps")
+    assert second.reason.startswith("`run.stop_ms` (40 ms) is not a whole number of steps")
 
 
 def test_a_point_is_known_by_its_scenario_files_and_program_alone(

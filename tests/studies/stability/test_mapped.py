@@ -117,7 +117,7 @@ def test_cells_that_err_by_more_than_is_allowed_are_inaccurate(
     assert list(table["x"]) == ["hold"] * 3 + ["linear"] * 3
     refused = table[table["y"] == 3]
     assert set(refused["class"]) == {NOT_RUN}
-    assert all("no whole number of steps" in reason for reason in refused["reason"])
+    assert all("not a whole number of steps" in reason for reason in refused["reason"])
     ran = table[table["y"] != 3]
     errors = ran["error_active_stress_mean_kPa"].astype(float)
     assert list(ran["class"]) == [INACCURATE if error > 1.0 else SOUND for error in errors]

@@ -73,7 +73,7 @@ def test_a_reference_is_the_cell_itself_with_other_settings(limit_study: Path) -
         if place.y == 30:
             # It does not divide the run.
             assert (place.point, place.reference) == (None, None)
-            assert "no whole number of steps" in place.reason
+            assert "not a whole number of steps" in place.reason
             continue
         assert not isinstance(place.reference, str)
         assert place.reference is not None

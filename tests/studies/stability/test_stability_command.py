@@ -46,7 +46,7 @@ def test_interrupted_it_goes_on_where_it_was_and_more_workers_find_the_same(
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGINT
-    assert "the same command goes on from there" in told
+    assert "the same command continues from there" in told
     assert not (out / "stability.csv").exists()
     seen = _trials(out)
     assert 1 <= len(seen) < 8
