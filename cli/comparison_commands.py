@@ -33,13 +33,15 @@ def compare(
     from ..report.comparison.compared import opened as opened_runs
     from ..report.comparison.comparison_page import write_page
     from ..report.comparison.comparison_table import write_table
+    from ..report.comparison.differences import differences
 
     compared = opened_runs(folders)
     folder = output or Path("results") / f"comparison.{'.'.join(Path(name).name for name in compared.runs)}"[:_LONGEST]
     make_folder(folder, "--output")
-    table = write_table(compared, folder)
+    found = differences(compared)
+    table = write_table(found, folder)
     with Console(stderr=True).status("drawing the comparison"):
-        page = write_page(compared, folder, f"Comparison of {', '.join(compared.runs)}")
+        page = write_page(compared, found, folder, f"Comparison of {', '.join(compared.runs)}")
     for note in compared.notes:
         typer.echo(f"note: {note}", err=True)
     typer.echo(f"differences: {table}\npage: {page}")

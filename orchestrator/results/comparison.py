@@ -65,12 +65,12 @@ def measures(run: StoredRun, still: bool = False) -> dict[str, Measure]:
     for column, values in run.columns.items():
         known = values[np.isfinite(values)]
         if column != "time_ms" and len(known) and (still or np.any(known != known[0])):
-            text = f"{_spoken(column)}, largest difference at any time"
+            text = f"{spoken(column)}, largest difference at any time"
             found[column] = Measure(column, unit_of(column), text, partial(_curve, column))
     for name in run.moving if still else filter(partial(_moves, run), run.moving):
         compare: Callable[[str, StoredRun, StoredRun], Difference] = _events if name.endswith(_EVENTS) else _field
         when = "at the end" if name.endswith(_EVENTS) else "at the worst time"
-        text = f"{_spoken(name)}, root mean square over the mesh {when}"
+        text = f"{spoken(name)}, root mean square over the mesh {when}"
         found[name] = Measure(name, unit_of(name), text, partial(compare, name))
     return found
 
@@ -81,9 +81,15 @@ def unit_of(name: str) -> str:
     return last if last in _UNITS else ""
 
 
-def _spoken(name: str) -> str:
+def stem_of(name: str) -> str:
+    """A name without the unit of measure that it ends in."""
     unit = unit_of(name)
-    return (name.removesuffix(f"_{unit}") if unit else name).replace("_", " ")
+    return name.removesuffix(f"_{unit}") if unit else name
+
+
+def spoken(name: str) -> str:
+    """A name for a person, without its unit of measure."""
+    return stem_of(name).replace("_", " ")
 
 
 def _moves(run: StoredRun, name: str) -> bool:
@@ -204,7 +210,7 @@ def headlines(run: StoredRun) -> dict[str, float]:
         which, value = ("min", low) if start - low > high - start else ("max", high)
         if high > low:
             unit = unit_of(column)
-            stem = column.removesuffix(f"_{unit}") if unit else column
+            stem = stem_of(column)
             found[f"{stem}_{which}_{unit}" if unit else f"{stem}_{which}"] = value
     fractions = summary.get("ejection_fraction")
     if isinstance(fractions, dict):

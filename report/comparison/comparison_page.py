@@ -10,7 +10,7 @@ from ...studies.pictures.markup import NOTHING, safe
 from ...studies.point import value_text
 from .compared import Compared
 from .curves import compared_columns, curves
-from .differences import Row, headline_rows, measure_rows
+from .differences import Differences, Row
 from .side_by_side import side_by_side
 
 COMPARISON_HTML = "comparison.html"
@@ -18,26 +18,24 @@ COMPARISON_HTML = "comparison.html"
 STYLE = "img { max-width: 100%; height: auto } figure { margin: 1em 0 }\n"
 
 
-def write_page(compared: Compared, folder: Path, title: str, before: str = "") -> Path:
-    """Write comparison.html into `folder`; returns the file. `before` is HTML that stands above the comparison."""
+def write_page(compared: Compared, found: Differences, folder: Path, title: str) -> Path:
+    """Write comparison.html into `folder`; returns the file."""
     path = folder / COMPARISON_HTML
-    write_whole(path, document(title, before + body(compared), STYLE).encode())
+    write_whole(path, document(title, body(compared, found), STYLE).encode())
     return path
 
 
-def body(compared: Compared) -> str:
+def body(compared: Compared, found: Differences) -> str:
     """Settings, headline numbers, differences, curves and bodies, as HTML."""
     notes = "".join(f"<p><strong>{safe(note)}</strong></p>\n" for note in compared.notes)
     parts = [
         f"<p>All runs are compared with <code>{safe(compared.reference)}</code>.</p>\n{notes}",
         _settings(compared),
     ]
-    headline = headline_rows(compared)
-    if headline:
-        parts.append(f"<h2>Numbers of each run</h2>\n{_headlines(compared, headline)}")
-    measured = measure_rows(compared)
-    if measured:
-        parts.append(f"<h2>Largest differences over the whole run</h2>\n{_measures(measured)}")
+    if found.headlines:
+        parts.append(f"<h2>Numbers of each run</h2>\n{_headlines(compared, found.headlines)}")
+    if found.measured:
+        parts.append(f"<h2>Largest differences over the whole run</h2>\n{_measures(found.measured)}")
     picture = side_by_side(compared)
     if picture is not None:
         image = b64encode(picture).decode()

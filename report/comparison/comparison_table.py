@@ -7,20 +7,19 @@ from math import isfinite
 from pathlib import Path
 
 from ...orchestrator.results.whole import write_whole
-from .compared import Compared
-from .differences import Row, headline_rows, measure_rows
+from .differences import Differences, Row
 
 COMPARISON_CSV = "comparison.csv"
 
 _COLUMNS = ("run", "quantity", "unit", "reference", "value", "difference", "time_ms", "description", "why")
 
 
-def write_table(compared: Compared, folder: Path) -> Path:
+def write_table(found: Differences, folder: Path) -> Path:
     """Write comparison.csv into `folder`; returns the file. Its columns are the fields of `Row`."""
     text = io.StringIO()
     writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
     writer.writeheader()
-    for row in [*headline_rows(compared), *measure_rows(compared)]:
+    for row in [*found.headlines, *found.measured]:
         writer.writerow({name: _cell(value) for name, value in asdict(row).items()})
     path = folder / COMPARISON_CSV
     write_whole(path, text.getvalue().encode())

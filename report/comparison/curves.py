@@ -4,7 +4,7 @@ import numpy as np
 from plotly.graph_objects import Figure
 from plotly.subplots import make_subplots
 
-from ...orchestrator.results.comparison import unit_of
+from ...orchestrator.results.comparison import spoken, unit_of
 from ...studies.pictures.colors import COLORS
 from ...studies.pictures.markup import safe
 from .compared import Compared
@@ -56,8 +56,7 @@ def curves(compared: Compared) -> Figure | None:
             shown = True
     for row, column in enumerate(columns, start=1):
         unit = unit_of(column)
-        stem = (column.removesuffix(f"_{unit}") if unit else column).replace("_", " ")
-        figure.update_yaxes(title_text=f"{safe(stem)}<br>({unit or '1'})", row=row, col=1)
+        figure.update_yaxes(title_text=f"{safe(spoken(column))}<br>({unit or '1'})", row=row, col=1)
     figure.update_xaxes(showticklabels=True)
     figure.update_xaxes(title_text="time (ms)", row=len(columns), col=1)
     figure.update_layout(

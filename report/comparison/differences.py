@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import nan
 
-from ...orchestrator.results.comparison import headlines, measures, unit_of
+from ...orchestrator.results.comparison import headlines, measures, spoken, unit_of
 from .compared import Compared
 
 
@@ -39,7 +39,7 @@ def headline_rows(compared: Compared) -> list[Row]:
             known = reference is not None and value is not None
             missing = "" if known else f"only the run {compared.reference if value is None else run} has it"
             difference = nan if reference is None or value is None else value - reference
-            rows.append(Row(name, unit_of(name), _spoken(name), run, difference, reference, value, why=missing))
+            rows.append(Row(name, unit_of(name), spoken(name), run, difference, reference, value, why=missing))
     return rows
 
 
@@ -64,6 +64,14 @@ def measure_rows(compared: Compared) -> list[Row]:
     return rows
 
 
-def _spoken(name: str) -> str:
-    unit = unit_of(name)
-    return (name.removesuffix(f"_{unit}") if unit else name).replace("_", " ")
+@dataclass(frozen=True)
+class Differences:
+    """All that differs: headline numbers, and the largest differences over the whole run."""
+
+    headlines: list[Row]
+    measured: list[Row]
+
+
+def differences(compared: Compared) -> Differences:
+    """Computed once for table and page: every frame of every field of all runs is read for it."""
+    return Differences(headline_rows(compared), measure_rows(compared))

@@ -2,10 +2,10 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...orchestrator.results.comparison import headlines, unit_of
+from ...orchestrator.results.comparison import headlines, spoken, unit_of
 from ...orchestrator.results.whole import write_whole
 from ...studies.pictures.document import cell, document, table
 from ...studies.pictures.markup import NOTHING, safe
@@ -13,6 +13,7 @@ from ...studies.point import value_text
 from ...studies.sweep import Swept
 from .compared import Compared
 from .comparison_page import STYLE, body
+from .differences import differences
 
 SWEEP_CSV, SWEEP_HTML = "sweep.csv", "sweep.html"
 
@@ -22,8 +23,9 @@ _MOST_SHOWN = 12
 
 def write_sweep(swept: Sequence[Swept], folder: Path, name: str) -> tuple[Path, Path]:
     """Write the table and the page of the sweep of the scenario `name` into `folder`; returns both files."""
-    write_whole(folder / SWEEP_CSV, _csv(swept).encode())
-    write_whole(folder / SWEEP_HTML, _page(swept, f"{name}: {len(swept)} variants").encode())
+    numbers = _numbers(swept)
+    write_whole(folder / SWEEP_CSV, _csv(swept, numbers).encode())
+    write_whole(folder / SWEEP_HTML, _page(swept, numbers, f"{name}: {len(swept)} variants").encode())
     return folder / SWEEP_CSV, folder / SWEEP_HTML
 
 
@@ -34,9 +36,8 @@ def _numbers(swept: Sequence[Swept]) -> list[dict[str, float]]:
     return [headlines(each.trial.run) if each.trial is not None and each.trial.is_done else {} for each in swept]
 
 
-def _csv(swept: Sequence[Swept]) -> str:
+def _csv(swept: Sequence[Swept], numbers: Sequence[Mapping[str, float]]) -> str:
     """Settings, how it went, headline numbers, cost, and the folder with the whole results."""
-    numbers = _numbers(swept)
     keys, names = list(swept[0].settings), list(dict.fromkeys(name for each in numbers for name in each))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -52,19 +53,19 @@ def _csv(swept: Sequence[Swept]) -> str:
     return text.getvalue()
 
 
-def _page(swept: Sequence[Swept], title: str) -> str:
+def _page(swept: Sequence[Swept], numbers: Sequence[Mapping[str, float]], title: str) -> str:
     done = {each.name: each.trial.run for each in swept if each.trial is not None and each.trial.is_done}
     shown = dict(list(done.items())[:_MOST_SHOWN])
-    parts = [f"<h2>All runs</h2>\n{_table(swept)}"]
+    parts = [f"<h2>All runs</h2>\n{_table(swept, numbers)}"]
     if len(done) > len(shown):
         parts.append(f"<p>The first {len(shown)} of the {len(done)} complete runs are shown below.</p>")
     if len(shown) > 1:
-        parts.append(body(Compared(shown)))
+        compared = Compared(shown)
+        parts.append(body(compared, differences(compared)))
     return document(title, "\n".join(parts), STYLE)
 
 
-def _table(swept: Sequence[Swept]) -> str:
-    numbers = _numbers(swept)
+def _table(swept: Sequence[Swept], numbers: Sequence[Mapping[str, float]]) -> str:
     names = list(dict.fromkeys(name for each in numbers for name in each))
     lines = []
     for each, found in zip(swept, numbers, strict=True):
@@ -73,5 +74,5 @@ def _table(swept: Sequence[Swept]) -> str:
         line += "".join(cell(f"{found[name]:.4g}" if name in found else NOTHING, "number") for name in names)
         wall = f"{trial.wall_s:.3g}" if trial is not None and trial.is_done else NOTHING
         lines.append(line + cell(wall, "number") + cell(safe(each.reason or ("" if trial is None else trial.reason))))
-    heads = [f"{name.removesuffix(f'_{unit_of(name)}').replace('_', ' ')} ({unit_of(name) or '1'})" for name in names]
+    heads = [f"{spoken(name)} ({unit_of(name) or '1'})" for name in names]
     return table([*swept[0].settings, "status", *heads, "wall clock (s)", "reason"], lines)

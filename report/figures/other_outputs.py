@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...orchestrator.participants.participant import Values
-from ...orchestrator.results.comparison import unit_of
+from ...orchestrator.results.comparison import spoken, unit_of
 from ...orchestrator.results.stored_run import StoredRun
 from .plot_axes import curve, key, label, panels, span
 
@@ -29,11 +29,11 @@ def other_outputs(run: StoredRun) -> Figure | None:
     figure, axes = panels(len(shown), 2.8)
     for axis, (unit, columns) in zip(axes, shown.items(), strict=True):
         for number, (name, values) in enumerate(list(columns.items())[:_MOST_CURVES]):
-            curve(axis, number, time, values, _spoken(name, unit))
+            curve(axis, number, time, values, spoken(name))
         left = len(columns) - _MOST_CURVES
         label(axis, vertical=f"({unit})" if unit else "value (1)")
         if len(columns) == 1:
-            label(axis, vertical=f"{_spoken(next(iter(columns)), unit)} ({unit or '1'})")
+            label(axis, vertical=f"{spoken(next(iter(columns)))} ({unit or '1'})")
         else:
             key(axis)
             axis.set_title(f"{left} more columns are in timeseries.csv" if left > 0 else "", fontsize=10, loc="right")
@@ -44,8 +44,3 @@ def other_outputs(run: StoredRun) -> Figure | None:
 
 def _is_shown(column: str) -> bool:
     return column.endswith(_ELSEWHERE) or (column.startswith("potential_") and column.endswith("_mV"))
-
-
-def _spoken(column: str, unit: str) -> str:
-    stem = column.removesuffix(f"_{unit}") if unit else column
-    return stem.replace("_", " ")

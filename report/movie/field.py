@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize
 
 from ...orchestrator.errors import InputError, did_you_mean
 from ...orchestrator.participants.participant import Values
-from ...orchestrator.results.comparison import unit_of
+from ...orchestrator.results.comparison import spoken, stem_of, unit_of
 from ...orchestrator.results.stored_run import StoredRun
 from ..figures.tissue import nodal_mean
 
@@ -37,7 +37,7 @@ class MovieField:
         nodes, elements = (0 if array is None else len(array) for array in (run.points_mm, run.cells))
         shapes = {name: run.frame(name, 0) for name in run.moving if not name.endswith(_EVENTS)}
         known = {
-            name: name.removesuffix(f"_{unit_of(name)}")
+            name: stem_of(name)
             for name, values in shapes.items()
             if values is not None and values.shape in ((nodes,), (elements,))
         }
@@ -55,7 +55,7 @@ class MovieField:
     def label(self) -> str:
         """For the colour bar, with the unit of measure."""
         unit = unit_of(self.name)
-        stem = self.name.removesuffix(f"_{unit}").replace("_", " ")
+        stem = spoken(self.name)
         return f"{'transmembrane ' * (stem == 'potential')}{stem} ({unit or '1'})"
 
     def at(self, frame: int) -> Values:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
-from ...orchestrator.results.comparison import unit_of
+from ...orchestrator.results.comparison import stem_of, unit_of
 from .source import Source
 
 
@@ -48,7 +48,7 @@ class Quantity:
     @property
     def spoken(self) -> str:
         """The name for a person."""
-        stem = self.name.removesuffix(f"_{self.unit}") if self.unit else self.name
+        stem = stem_of(self.name)
         if stem.startswith("activation_") and self.unit == "ms":
             return f"activation at {stem.removeprefix('activation_')}"
         for ending, which in (("_min", "smallest"), ("_max", "largest")):

@@ -11,6 +11,7 @@ from cardiac_cosim.orchestrator.errors import InputError
 from cardiac_cosim.report.comparison.compared import opened
 from cardiac_cosim.report.comparison.comparison_page import write_page
 from cardiac_cosim.report.comparison.comparison_table import write_table
+from cardiac_cosim.report.comparison.differences import differences
 from cardiac_cosim.report.comparison.side_by_side import side_by_side
 
 
@@ -45,7 +46,7 @@ def _rows(path: Path) -> dict[str, dict[str, str]]:
 
 
 def test_every_difference_is_in_the_table_with_its_moment(pair: list[Path], tmp_path: Path) -> None:
-    rows = _rows(write_table(opened(pair), tmp_path))
+    rows = _rows(write_table(differences(opened(pair)), tmp_path))
     volume = rows["lv_volume_ml"]
     assert (volume["run"], volume["unit"], float(volume["difference"]), float(volume["time_ms"])) == (
         "<b>two", "ml", 3.0, 10.0
@@ -66,8 +67,8 @@ def test_a_run_does_not_differ_from_its_copy(tmp_path: Path) -> None:
     compared = opened(same)
     assert list(compared.runs) == ["a/heart", "b/heart"]
     assert compared.settings == {}
-    differences = [row["difference"] for row in _rows(write_table(compared, tmp_path)).values()]
-    assert {float(each) for each in differences} == {0.0}
+    found = [row["difference"] for row in _rows(write_table(differences(compared), tmp_path)).values()]
+    assert {float(each) for each in found} == {0.0}
 
 
 def test_settings_that_differ_are_named_and_others_are_not(pair: list[Path]) -> None:
@@ -83,7 +84,8 @@ def test_a_run_that_failed_and_another_version_are_said(tmp_path: Path) -> None:
 
 
 def test_the_page_shows_what_names_say_and_runs_nothing_of_it(pair: list[Path], tmp_path: Path) -> None:
-    page = write_page(opened(pair), tmp_path, "one and <b>two").read_text()
+    compared = opened(pair)
+    page = write_page(compared, differences(compared), tmp_path, "one and <b>two").read_text()
     assert "<b>two" not in page
     assert "&lt;b&gt;two" in page
     assert "lv volume<br>(ml)" in page.replace("\\u003c", "<").replace("\\u003e", ">")
@@ -111,7 +113,7 @@ def test_bodies_are_side_by_side_at_times_that_all_runs_have(tmp_path: Path) -> 
     picture = side_by_side(compared)
     assert picture is not None
     assert picture.startswith(b"\x89PNG")
-    page = write_page(compared, tmp_path, "title").read_text()
+    page = write_page(compared, differences(compared), tmp_path, "title").read_text()
     assert "data:image/png;base64," in page
     # With no time in common there is nothing to put side by side, and no picture of different moments.
     with h5py.File(runs[1] / "fields.h5", "a") as file:
