@@ -30,7 +30,7 @@ def headline_table(run: StoredRun) -> list[Headline]:
         quantity = Quantity(name, value, own)
         if own:
             text = measured(quantity)
-            source = sentence(quantity).removeprefix(f"{quantity.spoken}: {text}").lstrip(", ")
+            source = sentence(quantity).removeprefix(f"{quantity.spoken}: {text}").lstrip(",; ")
             found.append(Headline(quantity.spoken, text, source))
         else:
             found.append(Headline(quantity.spoken, f"{value:.4g} {quantity.unit}".rstrip()))

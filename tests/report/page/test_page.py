@@ -135,6 +135,12 @@ def test_headline_numbers_have_error_bars_where_an_error_budget_was_computed(run
     assert row.value == f"{value:.2f} ml ± 0.50"
     assert "mesh" in row.source
     assert row.value in write_page(folder).read_text(encoding="utf-8")
+    # Of two sources of nearly the same size the words begin otherwise.
+    (folder / "errors.csv").write_text(
+        f"{head}\nmesh,{name},{value},-0.4,2,1,,scene.refine=1\ncommunication step,{name},{value},0.3,1,1,,x\n"
+    )
+    (row,) = [row for row in headline_table(StoredRun(folder)) if "±" in row.value]
+    assert row.source == "the mesh contributes 0.4 and the communication step 0.3"
 
 
 def test_what_is_not_modelled_is_kept_and_shown(small_scenario: Path, tmp_path: Path) -> None:
